@@ -1,9 +1,8 @@
-"""Every effect of the catalogue against its closed form: what a unit of each parameter
-does to every measuring point.
+"""Effects of the catalogue against closed forms of the displacement of every measuring
+point.
 
-Closed forms are written with the robot's own chain as pinocchio sees it: frames, axes,
-Jacobians and loads carried to a frame by hand. The closed form of a new effect is in
-its own test, see `helpers/closed_forms.py`.
+Closed forms use frames, axes, Jacobians and loads of the robot's chain from pinocchio. The
+closed form of a new effect is in its own test, see `helpers/closed_forms.py`.
 """
 
 import numpy as np
@@ -44,7 +43,7 @@ def nest_eccentricity(arm, law, name):
 
 
 def scaled(arm, amount):
-    """All positions further from the foot by shares."""
+    """All positions, farther from the base by these shares."""
     displacement = np.zeros((STATES, len(arm.chain.points), 6))
     for number, point in enumerate(arm.chain.points):
         displacement[:, number, :3] = (
@@ -54,8 +53,7 @@ def scaled(arm, amount):
 
 
 def grown(arm, amount):
-    """The same but for the travel of carriages, whose scale and spindle are not of the
-    castings."""
+    """As `scaled`, but without the travel of carriages, which castings do not change."""
     travel = np.array(
         [t.kind == "T" for t in arm.chain.transforms if t.coordinate is not None]
     )
@@ -86,7 +84,7 @@ def link_weight(arm, law, name):
 
 
 def declared_masses(arm, law, name):
-    """Of all the masses that the sites declare, or of the one that the name counts."""
+    """Torques of all declared masses, or of the one whose number is in the name."""
     torques = []
     for mass in MASSES:
         after = arm.places[mass.link - 1] + 1
@@ -118,33 +116,39 @@ def bearing_runout(arm, law, name):
     return six(arm, position + 1, fixed, f"d{axis}", amount, arm.far_end(law.joints[0]))
 
 
+def bent_links(arm, law):
+    return arm.long if law.detail == "one section" else list(law.joints) or [0]
+
+
 def link_elasticity(arm, law, name, taper):
-    """Curvature and twist under the load on each piece of the link, integrated to its
-    far end."""
-    links = arm.long if law.detail == "one section" else list(law.joints) or [0]
+    """Integrate curvature and twist by the load on each piece of a link to its far
+    end."""
     displacement = 0.0
-    # Of the uniform link that a force shifts, or a moment twists, as far.
+    # The parameter is that of a uniform link with the same deflection or torsion.
     power = 2 if name.startswith("bending") else 0
     softer = (1 - taper * (NODES + 1) / 2) ** -3.0
     uniform = (
         1.0 / (power + 1) / (WEIGHTS / 2 @ (softer * (1 - (NODES + 1) / 2) ** power))
     )
-    for link in links:
-        after, (along, length) = arm.far_end(link), arm.link(link)
+    for link in bent_links(arm, law):
+        after = arm.far_end(link)
+        along, length = arm.link(link)
         force, moment = arm.load(after)
         shift = turn = np.zeros((STATES, 3))
         for position, weighs in zip(
             length * (NODES + 1) / 2, WEIGHTS * length / 2, strict=True
         ):
             lever = along * (length - position)
-            rotation_here = (
+            bending_and_twist = (
                 (moment + np.cross(lever, force))
                 * weighs
                 * uniform
                 / (1 - taper * position / length) ** 3
             )
-            twist = along * (rotation_here * along).sum(axis=1, keepdims=True)
-            component = rotation_here - twist if name.startswith("bending") else twist
+            twist = along * (bending_and_twist * along).sum(axis=1, keepdims=True)
+            component = (
+                bending_and_twist - twist if name.startswith("bending") else twist
+            )
             shift = shift + np.cross(component, lever)
             turn = turn + component
         displacement = displacement + arm.moved(after, shift, turn)
@@ -226,7 +230,7 @@ def by_wrong_wrench(change):
 
 
 def turned_force(axis, force):
-    """By central differences of a finite turn."""
+    """Central differences of a finite rotation."""
     ahead, behind = (
         Rotation.from_rotvec(sign * 1e-4 * axis).apply(force) for sign in (1, -1)
     )
@@ -335,7 +339,7 @@ CLOSED_FORMS = {
 }
 
 
-def test_every_effect_has_a_closed_form_here_or_in_a_test_of_its_own():
+def test_every_effect_has_a_closed_form():
     effects = list_bundled_effects()
     assert set(CLOSED_FORMS) <= set(effects)
     for name in set(effects) - set(CLOSED_FORMS):
@@ -344,13 +348,13 @@ def test_every_effect_has_a_closed_form_here_or_in_a_test_of_its_own():
 
 @pytest.mark.parametrize("chain_name", CHAINS)
 @pytest.mark.parametrize("name", sorted(CLOSED_FORMS))
-def test_effect_is_its_closed_form(name, chain_name):
+def test_effect_agrees_with_its_closed_form(name, chain_name):
     effect = list_bundled_effects()[name]
     check_closed_form(effect.candidates, CLOSED_FORMS[name], chain_name)
 
 
 @pytest.mark.parametrize("chain_name", CHAINS)
-def test_springs_of_the_declared_model_turn_each_joint_by_its_torque(chain_name):
+def test_joint_compliances_rotate_each_joint_by_its_torque(chain_name):
     def closed(arm, law, name):
         joint = int(name.removeprefix("c"))
         turned = arm.of_joint(joint, arm.torque[:, joint - 1])

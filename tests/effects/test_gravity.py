@@ -1,5 +1,5 @@
-"""Weights, declared or not: torques by pinocchio, slopes by central differences, fits
-with wrong masses, a compensator."""
+"""Declared and undeclared weights: torques against pinocchio, sensitivities against central
+differences, priors, and levers of pulls."""
 
 from dataclasses import replace
 
@@ -68,34 +68,31 @@ def gravity_by_pinocchio(chain, after, mass, centre, gravity, coordinates):
 
 
 @pytest.mark.parametrize("name", ["fanuc", "fixed rotations", "track"])
-def test_gravity_on_every_coordinate_where_the_robot_has_yielded_is_that_of_pinocchio(
-    name, fanuc
-):
+def test_gravity_at_the_displaced_pose_agrees_with_pinocchio(name, fanuc):
     robot = weighed(
         fanuc if name == "fanuc" else robot_of((OTHER_CHAINS | ODD_CHAINS)[name])
     )
     sites = build_sites(robot)
-    base = candidates_on(sites)["base_compliance"]
-    model = make_model(robot, effects=(base,))
+    model = make_model(robot, effects=[candidates_on(sites)["base_compliance"]])
     estimate = make_estimate(model, seed=2, size=1.0)
     states = make_states(robot.joints, 3, seed=3, force=300.0)
     around = evaluate_conditions(model, estimate, states)
-    at = compute_displaced_coordinates(model, estimate, around)
+    displaced = compute_displaced_coordinates(model, estimate, around)
     corrections = around.mass_corrections.reshape(-1, 4)
     assert corrections.any()
     expected = 0.0
     for mass, correction in zip(robot.masses, corrections, strict=True):
         total = mass.mass_kg + correction[0]
         centre = np.array(mass.centre_m) + correction[1:] / total
-        # Whatever tilts its joint, or the foot, carries it.
+        # The coordinates that tilt its joint, or the base, carry the mass.
         carrying = sites.tilt[mass.link - 1] if mass.link else sites.base
         after = 1 + max(
-            index_of_transform
-            for index_of_transform, t in enumerate(sites.chain.transforms)
-            if t.coordinate in carrying
+            number
+            for number, transform in enumerate(sites.chain.transforms)
+            if transform.coordinate in carrying
         )
         expected = expected + gravity_by_pinocchio(
-            sites.chain, after, total, centre, TILTED, at
+            sites.chain, after, total, centre, TILTED, displaced
         )
     np.testing.assert_allclose(
         around.gravity, expected, rtol=0, atol=1e-6 * np.abs(expected).max()
@@ -103,12 +100,16 @@ def test_gravity_on_every_coordinate_where_the_robot_has_yielded_is_that_of_pino
     np.testing.assert_array_equal(around.total, around.load + around.gravity)
 
 
+def select_effects(robot, keys):
+    candidates = candidates_on(build_sites(robot))
+    return [candidates[key] for key in keys]
+
+
 @pytest.mark.parametrize("identified", [True, False], ids=["identified", "nominal"])
-def test_masses_and_compliances_have_exact_sensitivities_with_all_that_they_load(
+def test_sensitivities_to_masses_and_compliances_include_effects_that_they_load(
     fanuc, identified
 ):
     robot = weighed(fanuc)
-    candidates = candidates_on(build_sites(robot))
     keys = (
         "stiffening@2",
         "lost_motion@3",
@@ -122,7 +123,7 @@ def test_masses_and_compliances_have_exact_sensitivities_with_all_that_they_load
         rows=6,
         compliance=fanuc.compliance,
         identified=identified,
-        effects=[candidates[key] for key in keys],
+        effects=select_effects(robot, keys),
     )
     estimate = make_estimate(model, seed=4)
     states = make_states(6, 8, seed=5)
@@ -159,7 +160,7 @@ def test_masses_and_compliances_have_exact_sensitivities_with_all_that_they_load
     )
 
 
-def test_priors_are_those_of_the_robot_file(fanuc):
+def test_priors_of_masses_follow_from_the_robot_file(fanuc):
     robot = replace(
         fanuc,
         masses=(
@@ -191,14 +192,14 @@ def test_priors_are_those_of_the_robot_file(fanuc):
     ("stated", "expected"),
     [
         ({"payload_kg": 210.0}, 0.15 * 210),
-        # A sixth of the arm's own mass is what arms carry.
+        # Arms carry a sixth of their own mass.
         ({"masses": (600.0, 300.0, 0.0)}, 0.15 * 900 / 6),
         ({"payload_kg": 20.0, "masses": (600.0, 300.0)}, 0.15 * 20),
         # Rated loads grow with the volume that an arm reaches.
         ({}, 0.15 * 8.0 * 3.107**3),
     ],
 )
-def test_plausible_payload_is_a_share_of_what_the_robot_carries_as_far_as_that_is_known(
+def test_plausible_payload_is_a_share_of_the_rated_or_estimated_payload(
     fanuc, stated, expected
 ):
     masses = tuple(
@@ -218,10 +219,10 @@ def test_plausible_payload_is_a_share_of_what_the_robot_carries_as_far_as_that_i
 
 
 @pytest.mark.parametrize("share", [0.0, 0.005, 0.05])
-def test_moments_that_are_a_hundredth_off_still_have_a_place_that_turns_with_the_flange_and_others_have_none(
+def test_the_lever_of_a_pull_is_found_if_moments_are_a_hundredth_off(
     share,
 ):
-    """Forces anywhere with the flange anywhere."""
+    """Forces and flange orientations are random."""
     rng = np.random.default_rng(0)
     force = 300.0 * rng.standard_normal((8, 3))
     rotation = Rotation.random(8, rng=rng).as_matrix()
@@ -234,7 +235,7 @@ def test_moments_that_are_a_hundredth_off_still_have_a_place_that_turns_with_the
     )
 
 
-def test_a_bias_is_there_wherever_something_is_recorded_be_it_a_moment_alone(fanuc):
+def test_a_bias_acts_in_all_states_with_a_recorded_force_or_moment(fanuc):
     states = make_states(6, 3, seed=4)
     states.wrench[:] = [
         [300.0, 20.0, 10.0, 1.0, 2.0, 3.0],
@@ -254,7 +255,7 @@ def test_a_bias_is_there_wherever_something_is_recorded_be_it_a_moment_alone(fan
         np.testing.assert_allclose(turned, expected, rtol=1e-12)
 
 
-def test_structure_bears_the_usual_weight_where_neither_masses_nor_loads_are_known(
+def test_without_masses_and_loads_the_structure_bears_the_usual_weight(
     fanuc,
 ):
     """Half of each link at either end, six times the rated load in all: slopes of its

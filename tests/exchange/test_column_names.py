@@ -1,5 +1,5 @@
-"""What columns are: found by their names and units, asked for where they could be two
-things; orientations in any notation."""
+"""Columns are recognized by names and units, ambiguous ones are refused, and orientations
+are read in any notation."""
 
 from dataclasses import replace
 
@@ -48,7 +48,7 @@ def test_headers_are_recognized(header, name, unit):
     assert name is None or is_name(name)
 
 
-def test_units_are_those_of_the_kind():
+def test_units_belong_to_the_kind_of_the_column():
     scales = {"x": 1e-3, "q7": 1e-3, "q1": np.pi / 180, "fx": 9.80665}
     assert find_scales(
         {"x": "mm", "q7": "mm", "q1": "degrees", "fx": "kgf"}
@@ -56,7 +56,7 @@ def test_units_are_those_of_the_kind():
 
 
 @pytest.mark.parametrize("header", ["Load [kg]", "Target [mm]"])
-def test_a_number_or_name_with_a_unit_is_a_question(tmp_path, header):
+def test_a_number_or_name_with_a_unit_is_refused(tmp_path, header):
     text = f"q1,x,y,z,{header}\n0,1,2,3,4\n"
     with refused(
         tmp_path / "t.csv", repr(header), f"--ignore {header!r}", f"={header!r}"
@@ -108,7 +108,7 @@ A_RAIL = robot_of("Tx(q1) Rz(q2) [A]")
         ),
     ],
 )
-def test_what_may_be_two_things_or_is_there_in_part_is_a_question(
+def test_ambiguous_and_incomplete_columns_are_refused(
     tmp_path, header, options, robot, words
 ):
     row = ",".join("1" * len(header.partition("\n")[0].split(",")))
@@ -116,7 +116,7 @@ def test_what_may_be_two_things_or_is_there_in_part_is_a_question(
         table(tmp_path, f"{header}\n{row}\n", replace(PLAIN, **options), robot)
 
 
-def test_options_go_before_what_a_table_says(tmp_path):
+def test_options_precede_the_header_of_the_table(tmp_path):
     imported = table(
         tmp_path,
         "q1,x,y,z\nmm,mm,mm,mm\n90,1,2,3\n",
@@ -136,7 +136,7 @@ def vector(imported):
     return [imported.table[name][0] for name in ("rx", "ry", "rz")]
 
 
-def test_orientations_are_of_the_columns_that_are_stated_or_of_q0_beside_the_other_parts(
+def test_orientations_are_read_from_stated_columns_and_quaternions_from_q0_to_q3(
     tmp_path,
 ):
     angles = dict(zip(("e1", "e2", "e3"), "ABC", strict=True))
@@ -193,7 +193,7 @@ def test_columns_may_have_the_names_of_the_robots_joints(tmp_path, headers):
     )
 
 
-def test_rounded_values_pass_and_what_is_no_rotation_is_marked():
+def test_rounded_rotations_are_accepted_and_other_matrices_are_marked():
     """That each notation is read as it is meant, tests/fuzz/test_dialects.py has."""
     rounded = np.round(
         Rotation.random(20, random_state=3).as_matrix().reshape(-1, 9), 4

@@ -1,5 +1,4 @@
-"""Programs say each target in the controller's words; names that it does not have are
-refused, unclear axes asked for."""
+"""Programs state all targets; forbidden program names and unclear axes are refused."""
 
 import re
 from pathlib import Path
@@ -49,7 +48,7 @@ def test_a_language_is_found_by_its_name():
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_every_target_stands_in_the_program_to_a_microdegree(name):
+def test_programs_state_targets_to_a_microdegree(name):
     targets_in_text, text = targets(name)
     read = np.array([numbers(target_text)[:6] for target_text in targets_in_text])
     np.testing.assert_allclose(
@@ -77,7 +76,7 @@ def test_a_rail_is_the_first_external_axis_in_millimetres(name, written):
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_a_name_that_no_program_may_have_is_refused(name):
+def test_a_forbidden_program_name_is_refused(name):
     reserved_names = ["TARGET_3"] if name == "rapid" else []
     longest = [] if name == "urscript" else ["x" * 40]
     for stem in ("1st", "my targets", "größe", "a-b", *longest, *reserved_names):
@@ -86,7 +85,7 @@ def test_a_name_that_no_program_may_have_is_refused(name):
     assert check_name(ALL[name], Path("out/targets_2.any")) == "targets_2"
 
 
-def test_six_joints_that_turn_are_plain_a_rail_is_an_external_axis_and_others_are_asked_for():
+def test_axes_of_six_joints_and_a_rail_are_found_and_others_must_be_stated():
     assert find_axes(ALL["krl"], (True, *SIX), "") == (
         "E1",
         "A1",

@@ -1,4 +1,4 @@
-"""Another program's table becomes measurements; what it leaves open is asked for."""
+"""Measurements from tables of other programs; ambiguous tables are refused."""
 
 import math
 from dataclasses import replace
@@ -11,7 +11,7 @@ from support import refused, robot_of
 from elastocal.exchange.measurement_table import ImportOptions
 
 
-def test_angles_lengths_and_forces_come_in_si_units_and_forces_of_the_robot_are_turned_round(
+def test_columns_are_converted_to_si_units_and_forces_by_the_robot_change_their_sign(
     tmp_path,
 ):
     text = "J1;J2;X;Y;Z;Fz [kN];Time [ms]\n90;-45;1000;2;3;0,5;2000\n"
@@ -37,7 +37,7 @@ def test_angles_lengths_and_forces_come_in_si_units_and_forces_of_the_robot_are_
     )
 
 
-def test_poses_loads_and_repeats_are_counted_where_no_column_has_them(tmp_path):
+def test_poses_loads_and_repeats_without_a_column_are_counted(tmp_path):
     rows = ["0,0", "0,0", "0,9", "0,9", "10,0", "10,-9", "10,9", "0.001,9"]
     imported = table(
         tmp_path, "q1,fz,x,y,z\n" + "\n".join(f"{row},1,2,3" for row in rows)
@@ -50,8 +50,11 @@ def test_poses_loads_and_repeats_are_counted_where_no_column_has_them(tmp_path):
     assert labelled.table["pose"].tolist() == [1, 2, 1]
 
 
-def test_the_options_found_out_give_the_same_again(tmp_path):
-    text = "made by\nq1 [rad];X [in];Y [in];Z [in];qw;qx;qy;qz;note\n0,5;1;2;3;1;0;0;0;a\n0,6;1;2;3;0;1;0;0;b\n"
+def test_the_resolved_options_give_the_same_result(tmp_path):
+    text = (
+        "made by\nq1 [rad];X [in];Y [in];Z [in];qw;qx;qy;qz;note\n"
+        "0,5;1;2;3;1;0;0;0;a\n0,6;1;2;3;0;1;0;0;b\n"
+    )
     imported = table(tmp_path, text, ImportOptions(target="smr"))
     assert imported.ignored == ("note",)
     assert (
@@ -73,7 +76,7 @@ def test_the_options_found_out_give_the_same_again(tmp_path):
 @pytest.mark.parametrize(
     "empty", [",,", "nan,NaN,1", "1,-,–", "#N/A,1,2", "-nan(ind),null,None"]
 )
-def test_rows_without_a_position_are_left_out_only_where_asked(tmp_path, empty):
+def test_rows_without_a_position_are_left_out_only_on_request(tmp_path, empty):
     text = f"q1,x,y,z\n1,1,2,3\n2,{empty}\n3,1,2,3\n"
     with refused(
         (tmp_path / "t.csv").as_posix(),
@@ -85,7 +88,7 @@ def test_rows_without_a_position_are_left_out_only_where_asked(tmp_path, empty):
     assert (len(imported.table["x"]), imported.skipped) == (2, 1)
 
 
-def test_a_table_without_a_header_has_the_columns_that_are_stated_and_a_matrix_gives_a_pose(
+def test_a_table_without_a_header_has_the_stated_columns(
     tmp_path,
 ):
     names = ["q1", "q2", *(f"t{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4))]
@@ -101,7 +104,7 @@ def test_a_table_without_a_header_has_the_columns_that_are_stated_and_a_matrix_g
     assert table(tmp_path, text, imported.options).options == imported.options
 
 
-def test_several_targets_of_a_row_are_read_by_the_columns_that_are_stated(tmp_path):
+def test_several_targets_of_a_row_are_read_from_stated_columns(tmp_path):
     text = "q1,B_x,B_y,B_z,A x,A y,A z,fz\n90,1,2,3,4,5,6,-5\n7,1,2,3,4,5,6,0\n"
     options = replace(
         PLAIN,
@@ -156,9 +159,7 @@ def test_several_targets_of_a_row_are_read_by_the_columns_that_are_stated(tmp_pa
         ),
     ],
 )
-def test_time_is_read_as_numbers_or_dates_or_left_out_with_a_note(
-    tmp_path, cells, seconds
-):
+def test_times_are_numbers_or_dates_or_left_out_with_a_note(tmp_path, cells, seconds):
     text = "q1,x,y,z,Time\n" + "".join(
         f"{number},1,2,3,{cell}\n" for number, cell in enumerate(cells.split("|"))
     )
@@ -237,7 +238,7 @@ def test_time_is_read_as_numbers_or_dates_or_left_out_with_a_note(
         ),
     ],
 )
-def test_what_is_missing_ambiguous_or_wrong_is_said_with_the_option_that_helps(
+def test_an_error_states_the_option_that_resolves_it(
     tmp_path, text, options, fragments
 ):
     source = (
@@ -250,9 +251,7 @@ def test_what_is_missing_ambiguous_or_wrong_is_said_with_the_option_that_helps(
 
 
 @pytest.mark.parametrize("name", ["=cmd", "@x", "a\u202eb"])
-def test_a_target_whose_name_would_be_a_formula_or_turn_letters_is_refused(
-    tmp_path, name
-):
+def test_a_target_name_that_is_a_formula_or_reverses_text_is_refused(tmp_path, name):
     with refused("", "", ""):
         table(
             tmp_path, f"q1,x,y,z,target\n1,1,2,3,{name}\n", replace(PLAIN, target=None)

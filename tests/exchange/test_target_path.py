@@ -1,4 +1,4 @@
-"""Files of wanted poses: what is in them, and every fault with its row and column."""
+"""Files of target poses: their contents, and every fault with its row and column."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def write_path(folder, header=HEADER, rows=ROWS):
     return path
 
 
-def test_poses_are_read_loads_and_postures_where_they_are(tmp_path):
+def test_poses_and_optional_loads_and_postures_are_read(tmp_path):
     targets = read_target_path(write_path(tmp_path), 6)
     np.testing.assert_array_equal(targets.position, [[1.0, 0.2, 0.5], [1.1, 0.2, 0.5]])
     np.testing.assert_allclose(
@@ -78,12 +78,12 @@ def test_poses_are_read_loads_and_postures_where_they_are(tmp_path):
         ),
     ],
 )
-def test_a_fault_is_refused_with_its_place(tmp_path, header, row, key, fragments):
+def test_a_fault_names_its_line_and_column(tmp_path, header, row, key, fragments):
     with refused((tmp_path / "path.csv").as_posix(), key, *fragments):
         read_target_path(write_path(tmp_path, header, [row]), 2)
 
 
-def test_joint_angles_in_degrees_are_refused_as_such(tmp_path):
+def test_joint_angles_in_degrees_are_refused(tmp_path):
     header = HEADER + "".join(f",q{joint}" for joint in range(1, 7))
     path = write_path(
         tmp_path,

@@ -1,5 +1,5 @@
-"""URDF, read safely, to robot file and back into poses and torques, beside pinocchio;
-every fault is one line."""
+"""Robots of URDF files: poses and torques against pinocchio, and refusals of unsafe or
+invalid files."""
 
 import numpy as np
 import pytest
@@ -99,9 +99,7 @@ def assert_same_weight(arm, path, within=None):
         ("upper", "hand", ("elbow", "rail", "wrist")),
     ],
 )
-def test_a_chain_or_a_part_of_the_tree_stands_and_weighs_where_pinocchio_has_it(
-    tmp_path, base, tip, names
-):
+def test_poses_and_weights_of_a_chain_agree_with_pinocchio(tmp_path, base, tip, names):
     path = written(tmp_path, *ARM)
     result = robot_from_urdf(path, base, tip)
     arm = through_its_file(result)
@@ -127,7 +125,7 @@ def test_a_chain_or_a_part_of_the_tree_stands_and_weighs_where_pinocchio_has_it(
         ((-170, 170), "limits of -170 to 170, no radians"),
     ],
 )
-def test_no_limits_and_those_that_are_no_radians_are_a_turn_either_way(
+def test_limits_that_are_missing_or_not_in_radians_become_one_turn_either_way(
     tmp_path, limits, limits_found
 ):
     free = written(
@@ -188,7 +186,7 @@ def one_joint(*names, **more):
         ),
     ],
 )
-def test_what_makes_no_chain_is_refused(tmp_path, parts, links, key, fragments):
+def test_links_that_make_no_chain_are_refused(tmp_path, parts, links, key, fragments):
     path = written(tmp_path, *parts)
     with refused(path, key, *fragments):
         robot_from_urdf(path, *links)
@@ -197,8 +195,14 @@ def test_what_makes_no_chain_is_refused(tmp_path, parts, links, key, fragments):
 SOUND = (link("a"), link("b"), joint("j", "a", "b"))
 PLACE = 'xyz="0.0 0.0 0.0"'
 LAUGHS = "".join(f'<!ENTITY l{n} "{f"&l{n - 1};" * 10}">' for n in range(1, 10))
-BOMB = f'<?xml version="1.0"?><!DOCTYPE robot [<!ENTITY l0 "ha">{LAUGHS}]><robot name="&l9;"><link name="a"/></robot>'
-OUTSIDE = '<!DOCTYPE robot [<!ENTITY x SYSTEM "file:///etc/passwd">]><robot name="&x;"><link name="a"/></robot>'
+BOMB = (
+    f'<?xml version="1.0"?><!DOCTYPE robot [<!ENTITY l0 "ha">{LAUGHS}]>'
+    '<robot name="&l9;"><link name="a"/></robot>'
+)
+OUTSIDE = (
+    '<!DOCTYPE robot [<!ENTITY x SYSTEM "file:///etc/passwd">]>'
+    '<robot name="&x;"><link name="a"/></robot>'
+)
 
 
 def file_of(folder, text, encoding="utf-8"):
@@ -207,7 +211,7 @@ def file_of(folder, text, encoding="utf-8"):
     return path
 
 
-def test_meshes_and_what_else_is_no_joint_or_mass_is_left_out(tmp_path):
+def test_only_joints_and_masses_are_read(tmp_path):
     mesh = (
         '<visual><geometry><mesh filename="package://gone/x.stl"/></geometry></visual>'
     )
@@ -228,13 +232,13 @@ def test_meshes_and_what_else_is_no_joint_or_mass_is_left_out(tmp_path):
 @pytest.mark.parametrize(
     "text", [BOMB, OUTSIDE], ids=["entities of entities", "an entity outside"]
 )
-def test_entities_are_refused_before_they_are_looked_at(tmp_path, text):
+def test_entities_are_refused_before_they_are_expanded(tmp_path, text):
     for encoding in ("utf-8", "utf-16"):
         with refused(tmp_path / "made.urdf", "", "<!DOCTYPE"):
             read_urdf(file_of(tmp_path, text, encoding))
 
 
-def test_more_than_a_urdf_can_have_is_refused_at_once(tmp_path, monkeypatch):
+def test_too_large_files_are_refused(tmp_path, monkeypatch):
     links = [link(f"l{number}") for number in range(2002)]
     joints = [
         joint(f"j{number}", f"l{number}", f"l{number + 1}") for number in range(2001)
@@ -254,7 +258,10 @@ def changed(old, new):
     return robot(*SOUND[:2], SOUND[2].replace(old, new))
 
 
-MACRO = '<robot name="x" xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="y"/></robot>'
+MACRO = (
+    '<robot name="x" xmlns:xacro="http://ros.org/wiki/xacro">'
+    '<xacro:include filename="y"/></robot>'
+)
 FAULTS = {
     "a macro": (MACRO, "", ["<xacro:include>", "run it first"]),
     "a property": (
@@ -294,7 +301,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_fault_is_one_line(tmp_path, fault):
+def test_every_fault_is_reported_in_one_line(tmp_path, fault):
     text, key, fragments = FAULTS[fault]
     with refused(tmp_path / "made.urdf", key, *fragments):
         read_urdf(file_of(tmp_path, text))
@@ -322,7 +329,7 @@ FINGER = (
 )
 
 
-def test_what_moves_beside_the_chain_weighs_as_at_zero_and_beside_the_column_not_at_all(
+def test_side_branches_weigh_as_at_zero_and_moving_ones_on_the_column_not_at_all(
     tmp_path,
 ):
     masses, (note,) = weights(tmp_path, *FLANGED, *FINGER)
@@ -352,7 +359,7 @@ def test_equal_masses_are_placeholders(tmp_path):
     assert len(heavier) == 4
 
 
-def test_gravity_turns_with_a_base_that_does_not_stand_upright(tmp_path):
+def test_gravity_is_expressed_in_a_tilted_base(tmp_path):
     wall = (
         link("wall"),
         joint("bolts", "wall", "base", "fixed", rpy=(0, np.pi / 2, 0)),

@@ -1,5 +1,4 @@
-"""The user's own URDF with joint origins changed and nothing else, as pinocchio has
-it."""
+"""Calibrated joint origins in the user's own URDF, against pinocchio."""
 
 from xml.etree import ElementTree as Xml
 
@@ -73,7 +72,7 @@ def cell(tmp_path):
     return path, robot, calibrated_of(robot)
 
 
-def test_all_but_joint_origins_is_as_it_was(cell):
+def test_only_joint_origins_change(cell):
     output, corrected = export_arm(*cell)
     assert corrected.changed == 4 and (corrected.base, corrected.tip) == (
         "base",
@@ -105,7 +104,7 @@ def test_all_but_joint_origins_is_as_it_was(cell):
         ('xyz="0.6 0.0 0.8"', 'xyz="-0.6 0 -0.8"', "as the robot file has it"),
     ],
 )
-def test_another_robots_file_is_refused(cell, old, new, fragments):
+def test_the_file_of_another_robot_is_refused(cell, old, new, fragments):
     path, robot, calibrated = cell
     other_path = path.with_name("other.urdf")
     other_path.write_text(
