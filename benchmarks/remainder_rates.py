@@ -74,7 +74,7 @@ def exact_cases(poses: int) -> tuple[Case, Case]:
     )
 
 
-def drawn(case: Case, seed: int, part: int, size: float) -> tuple[Case, np.ndarray]:
+def drawn(case: Case, seed: int, number: int, size: float) -> tuple[Case, np.ndarray]:
     """A case with errors, and what no model could predict of it, (M, 3), m. `part`: of
     one robot, that of the seed."""
     fitted = fit_declared_model(case.model, case.observations, NOISE)
@@ -85,17 +85,18 @@ def drawn(case: Case, seed: int, part: int, size: float) -> tuple[Case, np.ndarr
     moved = robot.choice([1, 2])
     waves = np.sin(inputs.joint_angles[:, joints] + robot.uniform(0.0, 2.0 * np.pi, 2))
     deviation = 2.0 * size * waves.prod(axis=1)[:, None] * inputs.jacobian[:, :, moved]
-    draws = np.random.default_rng([seed, part])
+    draws = np.random.default_rng([seed, number])
     along = inputs.jacobian[:, :, :6]
     chance = (
         draws.normal(0.0, NOISE_M, deviation.shape)
         + (along @ draws.normal(0.0, JOINT_RAD, (len(along), 6, 1)))[..., 0]
     )
-    seen = case.observations
+    observations = case.observations
     return replace(
         case,
         observations=replace(
-            seen, position=seen.position + deviation + along @ offsets + chance
+            observations,
+            position=observations.position + deviation + along @ offsets + chance,
         ),
     ), chance
 
@@ -120,7 +121,8 @@ if __name__ == "__main__":
         errors = []
         for seed in range(asked.campaigns):
             (case, _), (held_out, chance) = (
-                drawn(each, seed, part, size) for part, each in enumerate(exact)
+                drawn(exact_case, seed, number, size)
+                for number, exact_case in enumerate(exact)
             )
             fitted = fit_declared_model(case.model, case.observations, NOISE)
             p_values.append(
@@ -131,13 +133,23 @@ if __name__ == "__main__":
             alone = compute_position_residuals(
                 *transfer_fit(fitted, case, held_out), held_out.observations
             )
-            plan = ResidualModelPlan("auto", blocks=False, within_range=True, seed=seed)
-            found = validate_residual_model(fitted, case, held_out, plan)
-            squares = [(off**2).sum(axis=1) for off in (alone, found.residual, chance)]
-            off = squares[1] - squares[0]
-            used += found.predictor is not None
-            worse += off.mean() > off.std(ddof=1) / np.sqrt(len(off)) > 0.0
-            errors.append([each.mean() for each in squares])
+            validated = validate_residual_model(
+                fitted,
+                case,
+                held_out,
+                "auto",
+                blocks=False,
+                within_range=True,
+                seed=seed,
+            )
+            squares = [
+                (residual**2).sum(axis=1)
+                for residual in (alone, validated.residual, chance)
+            ]
+            change = squares[1] - squares[0]
+            used += validated.predictor is not None
+            worse += change.mean() > change.std(ddof=1) / np.sqrt(len(change)) > 0.0
+            errors.append([squared_errors.mean() for squared_errors in squares])
         rates = ", ".join(
             f"p <= {level}: {np.mean(np.array(p_values) <= level):.3f}"
             for level in LEVELS

@@ -111,8 +111,8 @@ def _made(folder: Path) -> set[str]:
     """Files that jobs made, without what is noted on each job beside them."""
     files = (
         path.relative_to(folder)
-        for part in ("data", "results", "reports")
-        for path in (folder / part).rglob("*.*")
+        for top in ("data", "results", "reports")
+        for path in (folder / top).rglob("*.*")
     )
     return {
         path.as_posix()

@@ -38,12 +38,12 @@ LINK = re.compile(r"\]\(([^)#\s]+)")
 
 def repository_pages() -> list[Path]:
     """Every page of the repository, relative to its top."""
-    found = {
+    files = {
         path.relative_to(REPOSITORY)
         for pattern in PAGES
         for path in REPOSITORY.glob(pattern)
     }
-    return sorted(path for path in found if path.as_posix() not in NO_PAGES)
+    return sorted(path for path in files if path.as_posix() not in NO_PAGES)
 
 
 def linked_files(page: Path) -> set[Path]:

@@ -113,12 +113,12 @@ def _section(effect: Effect) -> str:
         f".. image:: /signatures/{effect.name}.svg\n"
         f"   :alt: Displacement of a measured point by {effect.words}\n\n"
     )
-    summary, _, rest = text.strip().partition("\n\n")
+    summary, _, body = text.strip().partition("\n\n")
     # A heading of a docstring would be a heading of the page.
-    rest, _, references = rest.partition("References\n----------\n")
+    body, _, references = body.partition("References\n----------\n")
     formula = f".. math:: {effect.formula}\n\n"
     head = f".. _{effect.name}:\n\n{_headed(title, '~')}"
-    paragraphs = (summary, formula + rest, moves, picture + _table(effect), references)
+    paragraphs = (summary, formula + body, moves, picture + _table(effect), references)
     text = "\n\n".join(paragraph.strip() for paragraph in paragraphs)
     return f"{head}{text}\n\n"
 

@@ -55,14 +55,15 @@ audit](../../docs/audit.md) the tables for an audit.
 
 def pages() -> dict[str, str]:
     """Text of each page by its name."""
-    found = {
-        f"{name}.md": _document(name, words) for name, words in DOCUMENTS.items()
+    documents = {
+        f"{name}.md": _document(name, description)
+        for name, description in DOCUMENTS.items()
     } | {"tables.md": _tables()}
     return {
         "index.md": HEAD
-        + "".join(f"{name.removesuffix('.md')}\n" for name in found)
+        + "".join(f"{name.removesuffix('.md')}\n" for name in documents)
         + "```\n",
-        **found,
+        **documents,
     }
 
 
@@ -112,17 +113,18 @@ def table_schemas(module: str) -> list[TableSchema]:
     package = import_module(module)
     if hasattr(package, "__path__"):
         names = sorted(
-            each.name for each in iter_modules(package.__path__, f"{module}.")
+            module_info.name
+            for module_info in iter_modules(package.__path__, f"{module}.")
         )
         return [
             *{
                 schema.name: schema for name in names for schema in table_schemas(name)
             }.values()
         ]
-    found = []
+    schemas = []
     for name, thing in vars(package).items():
         if isinstance(thing, TableSchema):
-            found.append(thing)
+            schemas.append(thing)
         elif (
             isfunction(thing)
             and thing.__module__ == module
@@ -133,8 +135,8 @@ def table_schemas(module: str) -> list[TableSchema]:
                 thing.__annotations__.get("return"),
             )
             if made_of in ((["joints"], TableSchema), (["joints"], "TableSchema")):
-                found.append(thing(JOINTS))
-    return found
+                schemas.append(thing(JOINTS))
+    return schemas
 
 
 def _table(schema: TableSchema) -> str:

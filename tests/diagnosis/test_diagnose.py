@@ -140,7 +140,7 @@ def test_measurements_at_fault_end_the_diagnosis_at_the_declared_model(
     verdict, names, case, monkeypatch
 ):
     found = [Fault(name, (), "as measured", (), (1.0, 1.0)) for name in names]
-    monkeypatch.setattr(module, "faults", lambda campaign: found)
+    monkeypatch.setattr(module, "find_faults", lambda campaign: found)
     monkeypatch.setattr(module, "_settle_rows", None)
     diagnosis = diagnose(case, Settings(), 1)
     document = diagnosis.document

@@ -6,7 +6,12 @@ import re
 import numpy as np
 
 from elastocal_proof.plant.arm import build_arm
-from elastocal_proof.plant.multibody import Structure, build_model, solve_equilibrium
+from elastocal_proof.plant.multibody import (
+    EquilibriumProblem,
+    Structure,
+    build_model,
+    solve_equilibrium,
+)
 
 STATES = 40
 
@@ -43,18 +48,20 @@ def at_rest(arm, angles, wrench, structure=None, compliance=None):
     compliance = arm.compliance if compliance is None else compliance
     machine = build_model(arm, structure or Structure())
     growth = np.zeros((len(angles), arm.joints + 1))
-    return machine, solve_equilibrium(
-        machine,
+    problem = EquilibriumProblem(
         angles,
-        lambda facing: wrench,
         growth,
-        lambda torque, unloaded: compliance * torque,
+        applied_wrench=lambda rotation: wrench,
+        gear_deflection=lambda torque, unloaded: compliance * torque,
     )
+    return machine, solve_equilibrium(machine, problem)
 
 
 def forces_at(machine, angles):
     """On the gears, and poses of the measuring points, where the drives stand at some
     angles and no spring has yielded."""
     growth = np.zeros((len(angles), angles.shape[1] + 1))
-    force, position, rotation = machine.forces(driven_to(machine, angles), growth)
+    force, position, rotation = machine.compute_forces(
+        driven_to(machine, angles), growth
+    )
     return force[:, machine.gear], position, rotation

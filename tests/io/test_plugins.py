@@ -1,5 +1,5 @@
-"""A package that is installed beside elastocal offers effects, importers, controllers
-and regressions; an error in it is one line that names the package."""
+"""An installed package offers effects, importers, controllers and regressions; an error
+in it is one line that names the package."""
 
 import json
 import os
@@ -85,7 +85,7 @@ def fit_mean(inputs, residual, settings, seed):
 
 MEAN_RESIDUAL = Regression("mean residual", fit_mean)
 '''
-# Uses one plug-in of each kind, as the commands do, and prints what came of it.
+# Use one plug-in of each kind, as the commands do, and print the results.
 PROGRAM = """
 import json, sys
 from pathlib import Path
@@ -97,14 +97,14 @@ from elastocal.campaigns.importers import find_importer
 from elastocal.campaigns.reading import read_campaign, read_robot
 from elastocal.effects.catalogue import candidates_on, list_bundled_effects, list_effects
 from elastocal.exchange.controllers import axes_of, find_controller, targets_of
-from elastocal.io.origin import environment
+from elastocal.io.origin import list_versions
 from elastocal.loop.loading import load_campaign
-from elastocal.mechanics.sites import sites_of
+from elastocal.mechanics.sites import build_sites
 from elastocal.residual_model.regressions import Inputs, list_regressions
 
 config, folder = map(Path, sys.argv[1:])
 robots = config / "robots"
-candidates = candidates_on(sites_of(read_robot(robots / "ur10.yaml")))
+candidates = candidates_on(build_sites(read_robot(robots / "ur10.yaml")))
 source = find_importer("workshop", config, "a test")
 rows = np.hstack([np.arange(72.0).reshape(12, 6), np.arange(36.0).reshape(12, 3)])
 np.savetxt(folder / "values.txt", rows)
@@ -131,7 +131,7 @@ print(json.dumps({
     "remainder": descriptions["campaign"]["remainder"],
     "program": controller.program("GO", targets),
     "prediction": predictor.mean(inputs).tolist(),
-    "version": environment(folder)["workshop-plugins"],
+    "version": list_versions(folder)["workshop-plugins"],
 }))
 """
 

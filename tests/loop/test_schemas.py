@@ -1,5 +1,5 @@
-"""Tables of the loop say what each column holds, and residuals are read without gross
-errors."""
+"""The columns of the loop's tables have unique names and meanings, and residuals are
+read without gross errors."""
 
 import numpy as np
 
@@ -7,9 +7,7 @@ from elastocal.io.storage import write_table
 from elastocal.loop import schemas
 
 
-def test_columns_have_names_of_their_own_and_a_meaning_and_gross_errors_are_left_out(
-    tmp_path,
-):
+def test_columns_have_unique_names_and_a_meaning():
     for schema in (
         schemas.STEPS,
         schemas.build_measurements_schema(7),
@@ -17,6 +15,9 @@ def test_columns_have_names_of_their_own_and_a_meaning_and_gross_errors_are_left
     ):
         assert len({column.name for column in schema.columns}) == len(schema.columns)
         assert all(column.meaning.strip() for column in schema.columns)
+
+
+def test_residuals_are_read_without_gross_errors(tmp_path):
     columns = {
         column.name: np.ones(3, column.type)
         for column in schemas.build_residuals_schema(6).columns

@@ -38,9 +38,9 @@ ARM = build_arm(document())
 
 
 def test_a_chain_is_cut_into_stretches_at_its_joints():
-    column, link, flange = ARM.stretches
+    column, link, flange = ARM.links
     np.testing.assert_allclose(
-        [s.vector_m for s in ARM.stretches],
+        [s.vector_m for s in ARM.links],
         [[0, 0, 0.4], [-0.2, 0, 0.5], [0, 0, 0.3]],
         atol=1e-15,
     )

@@ -101,8 +101,10 @@ def test_what_is_felt_is_what_the_cell_would_show_as_planned(rng, in_flange):
     cell = LoadCell(
         0.03, {"turn": (0.01, -0.02, 0.03), "bias": (5.0, -3.0, 2.0)}, 2e-5, in_flange
     )
-    shown = cell.shown(
-        cell.felt(force, np.broadcast_to([0.0, 0.5, 0.0], (5, 3)), facing)[:, :3],
+    shown = cell.compute_displayed_force(
+        cell.compute_applied_wrench(
+            force, np.broadcast_to([0.0, 0.5, 0.0], (5, 3)), facing
+        )[:, :3],
         facing,
     )
     loaded = force.any(axis=1)

@@ -166,8 +166,8 @@ def stated_effects(words):
 
 def test_stated_effects_are_compared_by_name_and_joint():
     cell = "link_weight (joint 2, 3) + payload"
-    words = "gravity sag of joints 2 to 3 and weight of an undeclared payload"
-    assert stated_effects(words) == named_effects(cell)
+    sentence = "gravity sag of joints 2 to 3 and weight of an undeclared payload"
+    assert stated_effects(sentence) == named_effects(cell)
     assert stated_effects("gravity sag of joint 2") != named_effects(cell)
 
 
@@ -187,15 +187,15 @@ def read_prose(page):
 
 def listed_without_table(page):
     groups = SOURCES[page].get("without a table", {}).values()
-    return [str(words) for group in groups for words in group]
+    return [str(text) for group in groups for text in group]
 
 
 def find_figures_without_source(page):
     text = read_prose(page)
     listed = [entry[3] for entry in list_entries() if entry[0] == page]
     covered = set()
-    for words in [*listed, *listed_without_table(page)]:
-        for match in re.finditer(re.escape(normalize(str(words))), text):
+    for listed_text in [*listed, *listed_without_table(page)]:
+        for match in re.finditer(re.escape(normalize(str(listed_text))), text):
             covered.update(range(*match.span()))
     return [
         match[0]
@@ -213,7 +213,9 @@ def test_no_figure_is_without_a_source(page):
 def test_words_that_are_listed_without_a_table_are_on_the_page(page):
     text = normalize((ROOT / page).read_text(encoding="utf-8"))
     absent = [
-        words for words in listed_without_table(page) if normalize(words) not in text
+        listed_text
+        for listed_text in listed_without_table(page)
+        if normalize(listed_text) not in text
     ]
     assert absent == []
 

@@ -46,18 +46,18 @@ def pages():
 
 def as_typed(line):
     """Remove comment, alignment and the folder of the environment from a line."""
-    words = re.sub(r"\s+#.*", "", line.strip())
-    return " ".join(words.split()).replace(".venv/bin/", "").replace(r"\|", "|")
+    command = re.sub(r"\s+#.*", "", line.strip())
+    return " ".join(command.split()).replace(".venv/bin/", "").replace(r"\|", "|")
 
 
 def begins_a_command(text):
-    words = text.split()
-    while words and re.fullmatch(r"\w+=\S*", words[0]):
-        words.pop(0)
+    arguments = text.split()
+    while arguments and re.fullmatch(r"\w+=\S*", arguments[0]):
+        arguments.pop(0)
     return (
-        bool(words)
-        and (words[0] in PROGRAMS or words[0].startswith("workflow/"))
-        and len(words) > 1
+        bool(arguments)
+        and (arguments[0] in PROGRAMS or arguments[0].startswith("workflow/"))
+        and len(arguments) > 1
     )
 
 
@@ -122,22 +122,22 @@ def test_the_command_has_every_subcommand_and_option_of_a_page():
         if text.startswith("elastocal ")
     ]
     assert len(entries) > 20
-    for words, line in entries:
+    for arguments, line in entries:
         command = get_command(app)
-        while words and words[0] in getattr(command, "commands", {}):
-            command = command.commands[words[0]]
-            words = words[1:]
+        while arguments and arguments[0] in getattr(command, "commands", {}):
+            command = command.commands[arguments[0]]
+            arguments = arguments[1:]
         assert (
             not getattr(command, "commands", {})
-            or not words
-            or words[0].startswith("-")
-        ), (line, words)
+            or not arguments
+            or arguments[0].startswith("-")
+        ), (line, arguments)
         options = {
             name
             for option in command.params
             for name in (*option.opts, *option.secondary_opts)
         }
-        given = {word.partition("=")[0] for word in words if word.startswith("--")}
+        given = {word.partition("=")[0] for word in arguments if word.startswith("--")}
         assert given <= options | {"--help"}, (line, given - options)
 
 
@@ -172,10 +172,10 @@ def test_targets_of_snakemake_are_rules():
         if text.startswith("snakemake ")
     )
     targets = {
-        word
-        for words in command_words
-        for word in words
-        if re.fullmatch(r"[a-z_]+", word)
+        argument
+        for arguments in command_words
+        for argument in arguments
+        if re.fullmatch(r"[a-z_]+", argument)
     }
     assert len(targets) > 5 and targets <= rule_names, targets - rule_names
 

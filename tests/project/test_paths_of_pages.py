@@ -99,14 +99,14 @@ def test_the_first_screen_has_the_claim_a_picture_the_figures_and_four_commands(
         ".venv/bin/elastocal demo",
     ]
     screen = "\n".join(first)
-    for words in (
+    for phrase in (
         "uncorrected | corrected | noise floor",
         "false alarms",
         "named correctly",
         "KUKA",
         "UR5",
     ):
-        assert words in screen
+        assert phrase in screen
 
 
 def test_the_six_steps_of_the_readme_are_in_their_order():

@@ -58,7 +58,7 @@ def export(
         )
     campaign = load_diagnosed_campaign(folder)
     # No file can hold the regression, so the files are of the robot without it.
-    calibrated = campaign.by_physics().calibrated
+    calibrated = campaign.without_regression().calibrated
     nominal = calibrated.robot
     folded = fold_effects(calibrated)
     states = campaign.case.observations.states

@@ -1,6 +1,5 @@
-"""A campaign that was diagnosed, from the files of its diagnosis: its calibrated robot,
-without a fit of its model, and the contents of its certificate, how good the robot is,
-against what, and how sure that is."""
+"""Load a diagnosed campaign from its files, restore its calibrated robot without a fit,
+and build the contents of its certificate."""
 
 from __future__ import annotations
 
@@ -122,8 +121,8 @@ class DiagnosedCampaign:
             robot, self.verdict.other_models_m or 0.0, contradicted=False
         )
 
-    def by_physics(self) -> DiagnosedCampaign:
-        """Return the same campaign as if no regression had been asked for."""
+    def without_regression(self) -> DiagnosedCampaign:
+        """Return the same campaign without the regression on the residual."""
         verdict = replace(
             self.verdict,
             remainder=None,
@@ -228,11 +227,12 @@ def build_certificate(
 ) -> dict[str, Any]:
     """Return the contents of a certificate.
 
-    All of the corrected robot is predicted, at the poses and loads of the campaign.
+    Every error of the corrected robot is predicted, at the poses and loads of the
+    campaign.
 
     Parameters
     ----------
-    campaign : Diagnosed
+    campaign : DiagnosedCampaign
         The campaign with its diagnosis.
     tolerance_m : float
         Largest allowed RMS position error, m.
@@ -258,7 +258,7 @@ def build_certificate(
     if not accuracy.fitted:
         missing.insert(
             0,
-            "nothing fitted: no error of 0 is predicted of a robot of which nothing was fitted",
+            "nothing fitted: no error is predicted for a robot without fitted parameters",
         )
     if missing and decision.decision == PASS:
         decision = replace(decision, decision=UNDECIDED)
@@ -315,28 +315,37 @@ def _describe_worst_pose(
 def compute_error_budget(
     calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray
 ) -> dict[str, float]:
-    """Error budget of a robot over commands (N, n) under loads (N, 6), m, RMS.
+    """Compute the error budget of a robot over commands, RMS, m.
 
-    What is missed without any correction; each effect by its name in the catalogue, or
-    ``joint_compliance``, if it alone were left out, largest first; what a correction
-    leaves, by `accuracy.predict_errors`. Only the last add up: effects may work against
-    each other, and loads meet springs.
+    The entries are: the error without any correction; each effect, by its name in the
+    catalogue or ``joint_compliance``, if it alone were left out of the correction,
+    largest first; and the errors that the correction leaves, by
+    `accuracy.predict_errors`. Only the squares of the last group add up, because effects
+    may work against each other and loads interact with compliances.
+
+    Parameters
+    ----------
+    calibrated : CalibratedRobot
+        The robot.
+    reported_angles : ndarray
+        Joint angles (N, n) as the controller reports them, rad.
+    wrench : ndarray
+        Loads (N, 6), N and N m.
     """
-    costs = compute_effect_contributions(calibrated, reported_angles, wrench)
-    rest = predict_errors(calibrated, reported_angles, wrench, draws=0)
-    ends = {
-        "left by the regression": root_mean_square(rest.regression_m),
-        "form of the model": root_mean_square(rest.form_m),
-        "not commanded": rest.scope.left_out_m,
+    contributions = compute_effect_contributions(calibrated, reported_angles, wrench)
+    by_size = sorted(contributions, key=contributions.__getitem__, reverse=True)
+    remaining = predict_errors(calibrated, reported_angles, wrench, draws=0)
+    budget = {
+        "uncorrected": compute_uncorrected_rms_m(calibrated, reported_angles, wrench)
     }
-    return {
-        "uncorrected": compute_uncorrected_rms_m(calibrated, reported_angles, wrench),
-        **{
-            name: costs[name]
-            for name in sorted(costs, key=costs.__getitem__, reverse=True)
-            if costs[name] > 0.0
-        },
-        "uncertainty of the parameters": root_mean_square(rest.parameters_m),
-        "repeatability": root_mean_square(rest.repeated_m),
-        **{name: end for name, end in ends.items() if end},
+    for name in by_size:
+        if contributions[name] > 0.0:
+            budget[name] = contributions[name]
+    budget["uncertainty of the parameters"] = root_mean_square(remaining.parameters_m)
+    budget["repeatability"] = root_mean_square(remaining.repeated_m)
+    optional = {
+        "left by the regression": root_mean_square(remaining.regression_m),
+        "form of the model": root_mean_square(remaining.form_m),
+        "not commanded": remaining.scope.left_out_m,
     }
+    return budget | {name: rms_m for name, rms_m in optional.items() if rms_m}

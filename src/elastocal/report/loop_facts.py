@@ -283,14 +283,14 @@ def _list_other_causes(verdict: Verdict) -> list[_Cause]:
     """Return probable causes that are not part of the verdict, the most probable
     first."""
     assert verdict.probabilities is not None
-    found = {effect.name for effect in verdict.missing_effects}
-    # Together with a mechanism that was found, the competitor is a related mechanism.
-    competitor = say.RELATED if found else say.UNKNOWN
+    missing = {effect.name for effect in verdict.missing_effects}
+    # Together with a missing mechanism, the competitor is a related mechanism.
+    competitor = say.RELATED if missing else say.UNKNOWN
     causes = []
     for name, probability in verdict.probabilities.mechanisms.items():
-        if name not in found:
-            words = competitor if name == OTHER else say.name_effect(name)
-            causes.append(_Cause(words, probability))
+        if name not in missing:
+            cause = competitor if name == OTHER else say.name_effect(name)
+            causes.append(_Cause(cause, probability))
     causes.append(_Cause(say.NOTHING, verdict.probabilities.nothing))
     shown = [cause for cause in causes if cause.probability >= _MIN_SHOWN_PROBABILITY]
     shown.sort(key=lambda cause: -cause.probability)
@@ -319,6 +319,9 @@ def describe_effect(effect: Effect, heldout: HeldOut) -> dict[str, Any]:
         if entry.probability >= _MIN_SHOWN_PROBABILITY
     ]
     alternatives = [say.format_alternative(name) for name in effect.alternatives]
+    left_out = ""
+    if len(identifiable) > len(shown):
+        left_out = format_integer(len(identifiable))
     return {
         "name": say.capitalize_first(say.name_effect(effect.name)),
         "found": say.format_found_effect(effect.name, effect.members),
@@ -330,9 +333,7 @@ def describe_effect(effect: Effect, heldout: HeldOut) -> dict[str, Any]:
         "unsure": _list_uncertain_locations(effect, locations),
         "parameters": rows,
         "with_prior": any(entry.prior_std for entry in shown),
-        "left_out": format_integer(len(identifiable))
-        if len(identifiable) > len(shown)
-        else "",
+        "left_out": left_out,
         "with_angle": any("q)" in row[0] for row in rows),
         "held": len(effect.parameters) - len(identifiable),
         "probability": say.format_probability(effect.probability),
@@ -340,14 +341,19 @@ def describe_effect(effect: Effect, heldout: HeldOut) -> dict[str, Any]:
         "cost_m": effect.cost_m,
         "gain": effect.heldout_gain,
         "adopted": effect.adopted,
-        "alternatives": say.join_items(alternatives, _MAX_NAMES)
-        if alternatives
-        else "",
-        "instead": say.join_items(alternatives, _MAX_NAMES, last="or")
-        if alternatives
-        else "",
         "common": say.find_common_kind(effect.name, effect.alternatives),
         "evidence": [],
+        **_list_alternatives(alternatives),
+    }
+
+
+def _list_alternatives(alternatives: Sequence[str]) -> dict[str, str]:
+    """Return alternatives as lists with "and" and with "or"; empty if there are none."""
+    if not alternatives:
+        return {"alternatives": "", "instead": ""}
+    return {
+        "alternatives": say.join_items(alternatives, _MAX_NAMES),
+        "instead": say.join_items(alternatives, _MAX_NAMES, last="or"),
     }
 
 
@@ -374,45 +380,45 @@ def _select_parameters(parameters: list[EffectParameter]) -> list[EffectParamete
     return ranked[:_SHOWN_PARAMETERS]
 
 
+# Facts of an effect that a fault of the data does not have.
+_NO_EFFECT_FACTS = {
+    "catalogue": "",
+    "locations": [],
+    "unsure": [],
+    "with_prior": False,
+    "left_out": "",
+    "with_angle": False,
+    "held": 0,
+    "probability": "",
+    "cost": "",
+    "cost_m": None,
+    "gain": None,
+    "adopted": False,
+}
+
+
 def describe_fault(fault: DataFault) -> dict[str, Any]:
-    """Return the facts of a fault of the data, with the keys of `effect_facts`."""
-    where = ""
+    """Return the facts of a fault of the data, with the keys of `describe_effect`."""
+    name = say.capitalize_first(say.split_underscores(fault.name))
     if fault.joints:
         noun = pluralize("joint", len(fault.joints))
-        where = f" of {noun} {say.join_items(map(str, fault.joints))}"
+        name += f" of {noun} {say.join_items(map(str, fault.joints))}"
     # RMS distance between measured and predicted positions, as written and with the
     # correction.
-    evidence = [value for value in fault.evidence if value is not None]
-    alternatives = fault.alternatives
+    evidence = []
+    if len(fault.evidence) == 2 and None not in fault.evidence:
+        evidence = [say.format_length(distance) for distance in fault.evidence]
     return {
-        "name": say.capitalize_first(say.split_underscores(fault.name)) + where,
+        **_NO_EFFECT_FACTS,
+        "name": name,
         "found": say.format_found_effect(fault.name, ()),
         "bare": say.name_effect(fault.name),
-        "catalogue": "",
         "family": fault.family,
         "description": say.format_sentence(fault.detail),
-        "locations": [],
-        "unsure": [],
         "parameters": [_fault_value_row(entry) for entry in fault.parameters],
-        "with_prior": False,
-        "left_out": "",
-        "with_angle": False,
-        "held": 0,
-        "probability": "",
-        "cost": "",
-        "cost_m": None,
-        "gain": None,
-        "adopted": False,
-        "alternatives": say.join_items(alternatives, _MAX_NAMES)
-        if alternatives
-        else "",
-        "instead": say.join_items(alternatives, _MAX_NAMES, last="or")
-        if alternatives
-        else "",
-        "common": say.find_common_kind(fault.name, alternatives),
-        "evidence": [say.format_length(value) for value in evidence]
-        if len(evidence) == len(fault.evidence) == 2
-        else [],
+        "common": say.find_common_kind(fault.name, fault.alternatives),
+        "evidence": evidence,
+        **_list_alternatives(fault.alternatives),
     }
 
 
@@ -584,8 +590,8 @@ def tabulate_undetermined(held: Iterable[str]) -> list[list[str]]:
     names_by_owner: dict[str, list[str]] = {}
     for key in held:
         owner, _, parameter = key.rpartition(" ")
-        words = say.name_parameter(effect_of(owner), parameter)
-        names_by_owner.setdefault(owner, []).append(words)
+        name = say.name_parameter(effect_of(owner), parameter)
+        names_by_owner.setdefault(owner, []).append(name)
     return [
         [say.capitalize_first(say.format_candidate(owner)), ", ".join(names)]
         for owner, names in names_by_owner.items()
@@ -606,8 +612,8 @@ def tabulate_untestable(untestable: Mapping[str, str]) -> list[list[str]]:
     """Return the candidates that were not tested, one row for each effect and reason."""
     keys_by_cause: dict[tuple[str, str], list[str]] = {}
     for key, reason in untestable.items():
-        words = reason.replace("no approach", "no direction of approach")
-        keys_by_cause.setdefault((effect_of(key), words), []).append(key)
+        cause = reason.replace("no approach", "no direction of approach")
+        keys_by_cause.setdefault((effect_of(key), cause), []).append(key)
     rows = []
     for (effect, reason), keys in keys_by_cause.items():
         locations = say.format_places(keys)

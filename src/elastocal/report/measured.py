@@ -112,13 +112,13 @@ def _describe_targets(
 ) -> str:
     """Return the targets that were measured, with their measuring points and mounts."""
     targets = list(campaign["targets"].items())
-    words = []
+    descriptions = []
     for index in np.unique(table["target"]):
         name, target = targets[index]
         prefix = "" if name == target["point"] else f"{name} "
         mount = _describe_mount(target, has_orientations=has_orientations)
-        words.append(f"{prefix}at the measuring point {target['point']}{mount}")
-    return say.join_items(words, _MAX_TARGETS)
+        descriptions.append(f"{prefix}at the measuring point {target['point']}{mount}")
+    return say.join_items(descriptions, _MAX_TARGETS)
 
 
 def _describe_mount(target: Mapping[str, Any], *, has_orientations: bool) -> str:

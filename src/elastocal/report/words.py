@@ -1,8 +1,8 @@
-"""Effects, locations, hypotheses, numbers and units as a robot engineer writes them:
+"""Write effects, locations, hypotheses, numbers and units as a robot engineer does:
 gravity sag of joint 2, 117.6 ± 3.6 µrad.
 
-Each effect of the catalogue brings its own words; nothing here knows one by name.
-Sentences stand in templates, which have the functions of this module as filters.
+The names of effects come from the catalogue. The functions of this module are filters of
+the templates that have the sentences.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ MILLI = 1e3
 NOTHING = "nothing is missing"
 UNKNOWN = "something that the catalogue does not have"
 RELATED = "a related mechanism"
-# A blank at which no line ends.
+# A blank without a line break.
 _TIED = "\u00a0"
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _KEY = r"(?P<effect>{names})(?:@(?P<joints>\d+(?:\+\d+)*))?(?:\[(?P<detail>[^\]]*)\])?"
@@ -36,7 +36,7 @@ _ANY_KEY = re.compile(_KEY.format(names=r"[^@\[]+") + "$")
 _LOCATION = re.compile(
     r"^(?:(?P<kind>joint|link)s? (?P<joints>\d+(?: and \d+)*))? ?(?P<detail>.*)$"
 )
-# What names of parameters are short for.
+# Patterns in the names of parameters, and their words.
 _PARAMETER_WORDS = (
     (r"^d([xyz])$", r"shift along \1"),
     (r"^r([xyz])$", r"rotation about \1"),
@@ -49,7 +49,7 @@ _PARAMETER_WORDS = (
     (r"\bmoment\b", "first moment"),
     (r"\b1 over ([EG])([IJ])\b", r"1/(\1\2)"),
 )
-# What the mechanisms of a family have in common.
+# Common kind of the mechanisms of a family.
 _IN_COMMON = {
     "elastic": "yielding",
     "geometry": "an error of geometry",
@@ -59,8 +59,10 @@ _IN_COMMON = {
     "load": "an error of the load",
     "drift": "drift of the set-up or by warmth",
 }
-# Parts of a robot that stand in a location in the place of a joint.
+# Parts of a robot that a location may name instead of a joint.
 _PARTS = ("column", "base")
+# From here on a length, rounded to three digits in µm, is a millimetre.
+_ROUNDS_TO_MM = 0.9995e-3
 # Upper bound on the locations that are listed with details, such as bands of orders; of
 # more locations only the joints are listed.
 _MAX_DETAILED = 2
@@ -209,90 +211,95 @@ def format_hypotheses(sets: Sequence[MechanismSet]) -> list[str]:
         elif added == {OTHER}:
             hypotheses.append(f"the same or {RELATED}")
         else:
-            words = format_mechanisms(sorted(added), hypothesis.locations)
-            hypotheses.append(f"the same with {words}")
+            addition = format_mechanisms(sorted(added), hypothesis.locations)
+            hypotheses.append(f"the same with {addition}")
     return hypotheses
 
 
 def format_mechanisms(
     names: Collection[str], locations: Mapping[str, Iterable[str]] = {}
 ) -> str:
-    """A set of mechanisms with their locations, where these are stated."""
-    named = [
+    """Return a set of mechanisms in words.
+
+    Parameters
+    ----------
+    names : collection of str
+        Effects of the catalogue, and `OTHER`.
+    locations : mapping of iterables of str
+        Locations of some of the effects.
+    """
+    effects = [
         format_located_effect(name, locations.get(name, ()))
         for name in names
         if name != OTHER
     ]
-    return " with ".join(named) + (
-        f" or {RELATED}" if named and OTHER in names else "" if named else UNKNOWN
-    )
+    if not effects:
+        return UNKNOWN
+    text = " with ".join(effects)
+    return f"{text} or {RELATED}" if OTHER in names else text
 
 
 def format_alternative(name: str) -> str:
-    """What may be meant instead of a mechanism: another, or a related one."""
+    """Return what may be meant instead of a mechanism: another, or a related one."""
     return RELATED if name == OTHER else name_effect(name)
 
 
 def find_common_kind(effect: str, alternatives: Iterable[str]) -> str:
-    """What an effect and all that may be meant instead have in common, as people call
-    it: yielding; empty of no one kind.
+    """Return what an effect and its alternatives have in common, such as "yielding".
 
-    What the catalogue does not have may be of any.
+    The result is empty if they are of several kinds, or if one of them is not in the
+    catalogue, because it may be of any kind.
     """
-    families = {
-        getattr(list_effects().get(name), "family", "")
-        for name in (effect, *alternatives)
-    }
-    kinds = {_IN_COMMON.get(family, "") for family in families}
+    kinds = set()
+    for name in (effect, *alternatives):
+        family = getattr(list_effects().get(name), "family", "")
+        kinds.add(_IN_COMMON.get(family, ""))
     return kinds.pop() if len(kinds) == 1 else ""
 
 
 def spell_out_names(text: str) -> str:
-    """A text with every name of the catalogue, every key of a candidate and the
-    parameter stated after it in words."""
+    """Return a text with names of the catalogue, keys of candidates and the parameters
+    stated after them in words."""
     names = "|".join(sorted(list_effects(), key=len, reverse=True))
 
-    def worded(found: re.Match[str]) -> str:
-        # Names that are common words, such as payload, are meant only as keys or where
-        # something is stated of them.
-        stands_alone = not (
-            found["joints"]
-            or found["detail"]
-            or text[found.end("key") :].startswith(":")
-        )
-        if "_" not in found["effect"] and stands_alone:
-            return found.group()
-        stated = (
-            f": {name_parameter(found['effect'], found['parameter'])} is "
-            if found["parameter"]
-            else ""
-        )
-        return format_candidate(found["key"]) + stated
+    def spell_out(match: re.Match[str]) -> str:
+        # Names that are common words, such as payload, are meant only as keys or if the
+        # text states something about them.
+        is_key = match["joints"] or match["detail"]
+        is_common_word = "_" not in match["effect"] and not is_key
+        if is_common_word and not text[match.end("key") :].startswith(":"):
+            return match.group()
+        candidate = format_candidate(match["key"])
+        if not match["parameter"]:
+            return candidate
+        return f"{candidate}: {name_parameter(match['effect'], match['parameter'])} is "
 
     key = r"(?<![\w@])(?P<key>" + _KEY.format(names=names) + r")(?!\w)"
-    return re.sub(key + r"(?:: (?P<parameter>\w+) is )?", worded, text)
+    return re.sub(key + r"(?:: (?P<parameter>\w+) is )?", spell_out, text)
 
 
 def split_underscores(name: str) -> str:
-    """A name of the catalogue or of a parameter as words."""
+    """Return a name of the catalogue or of a parameter as words."""
     return name.replace("_", " ")
 
 
-def join_items(items: Iterable[str], most: int | None = None, last: str = "and") -> str:
+def join_items(
+    items: Iterable[str], limit: int | None = None, last: str = "and"
+) -> str:
     """Return items as they stand in a sentence.
 
     Parameters
     ----------
     items : iterable of str
         The items.
-    most : int, optional
-        Upper bound on their number; the others are counted.
+    limit : int, optional
+        Upper bound on the items that are named; the others are counted.
     last : str
         Word before the last item.
     """
     shown = list(items)
-    if most is not None and len(shown) > most:
-        shown = [*shown[:most], f"{len(shown) - most} more"]
+    if limit is not None and len(shown) > limit:
+        shown = [*shown[:limit], f"{len(shown) - limit} more"]
     if not shown:
         return "none"
     if len(shown) == 1:
@@ -301,23 +308,23 @@ def join_items(items: Iterable[str], most: int | None = None, last: str = "and")
 
 
 def capitalize_first(text: str) -> str:
-    """A text with a capital at its beginning."""
+    """Return a text with a capital first letter."""
     return text[:1].upper() + text[1:]
 
 
 def format_sentence(text: str) -> str:
-    """A text with a capital and a full stop."""
-    text = text.strip()
-    return capitalize_first(text) + ("" if text.endswith(".") else ".")
+    """Return a text with a capital first letter and a full stop."""
+    sentence = capitalize_first(text.strip())
+    return sentence if sentence.endswith(".") else f"{sentence}."
 
 
 def set_minus(text: str) -> str:
-    """A number with a true minus sign."""
+    """Return a number with a typographic minus sign for its hyphen."""
     return text.replace("-", "−")
 
 
 def set_minus_in_sentence(text: str) -> str:
-    """A sentence whose numbers have a true minus sign."""
+    """Return a sentence with typographic minus signs in its numbers."""
     return re.sub(r"(?<= )-(?=\d)", "−", text)
 
 
@@ -334,14 +341,13 @@ def format_joint_ranges(joint_ranges: Sequence[JointRange]) -> str:
 
 
 def choose_length_unit(metres: float) -> tuple[float, str]:
-    """Unit in which a length is shown, with how many of them a metre has: µm below one
-    millimetre."""
-    return (MICRO, "µm") if abs(metres) < 0.9995e-3 else (MILLI, "mm")
+    """Return how many units a metre has, and the unit: µm below one millimetre, else
+    mm."""
+    return (MICRO, "µm") if abs(metres) < _ROUNDS_TO_MM else (MILLI, "mm")
 
 
 def format_length(metres: float | None, digits: int = 3) -> str:
-    """A length with its unit, µm below one millimetre; "unknown" where there is
-    none."""
+    """Return a length with its unit; "unknown" for None."""
     if metres is None:
         return "unknown"
     factor, unit = choose_length_unit(metres)
@@ -349,50 +355,48 @@ def format_length(metres: float | None, digits: int = 3) -> str:
 
 
 def format_millimetres(metres: float) -> str:
-    """A length without its unit in mm: three digits, and none finer than a
+    """Return a length in mm without its unit, with three digits but none below a
     micrometre."""
-    return (
-        format_number(MILLI * metres)
-        if abs(metres) >= 0.9995e-3
-        else f"{MILLI * metres:.3f}"
-    )
+    millimetres = MILLI * metres
+    if abs(metres) < _ROUNDS_TO_MM:
+        return f"{millimetres:.3f}"
+    return format_number(millimetres)
 
 
 def format_microradians(radians: float) -> str:
-    """An angle in µrad, with its unit."""
+    """Return an angle in µrad with its unit."""
     return f"{format_number(MICRO * radians)} µrad"
 
 
 def format_estimate(value: float, error: float) -> str:
-    """A number ± its standard error, of which two digits are given."""
+    """Return a number ± its standard error, of which two digits are given."""
     decimals = max(0, 1 - int(np.floor(np.log10(error))))
-    # What is rounded to zero has no sign.
-    return set_minus(
-        f"{round(value, decimals) + 0.0:.{decimals}f} ± {error:.{decimals}f}"
-    )
+    # Adding zero removes the sign of a value that is rounded to zero.
+    rounded = round(value, decimals) + 0.0
+    return set_minus(f"{rounded:.{decimals}f} ± {error:.{decimals}f}")
 
 
 def format_number(value: float, digits: int = 3) -> str:
-    """A number with so many significant digits and without an exponent."""
+    """Return a number with so many significant digits and without an exponent."""
     if value == 0:
         return "0"
-    # Rounded first: what rounds up to the next power of ten has one decimal less.
+    # Round first: a value that rounds up to the next power of ten has one decimal less.
     power = int(f"{value:.{digits - 1}e}".split("e")[1])
     return f"{value:.{max(0, digits - 1 - power)}f}"
 
 
 def format_percent(share: float) -> str:
-    """A share in percent."""
+    """Return a share in percent."""
     return f"{100 * share:.0f}{_TIED}%"
 
 
 def format_probability(probability: float) -> str:
-    """A probability in whole percent; none is given as 0 or 100 %."""
+    """Return a probability in whole percent; none is given as 0 or 100 %."""
     if probability < 0.005:
         return f"<{_TIED}1{_TIED}%"
-    return (
-        f">{_TIED}99{_TIED}%" if probability >= 0.995 else format_percent(probability)
-    )
+    if probability >= 0.995:
+        return f">{_TIED}99{_TIED}%"
+    return format_percent(probability)
 
 
 def format_with_unit(value: float, error: float | None, unit: str) -> tuple[str, str]:

@@ -253,8 +253,8 @@ def average_estimates(
 
     References
     ----------
-    [1] Owen, A. B. and Eckles, D., Bootstrapping data arrays of arbitrary order, Annals
-    of Applied Statistics 6, 2012.
+    .. [1] Owen, A. B. and Eckles, D., Bootstrapping data arrays of arbitrary order, Annals
+       of Applied Statistics 6, 2012.
     """
     total_weight: Any = 0.0
     weighted_sum: Any = 0.0

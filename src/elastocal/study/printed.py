@@ -15,12 +15,12 @@ is at least 1/(k + 1).
 
 References
 ----------
-[1] Geisser, S., Predictive Inference: An Introduction, Chapman and Hall, 1993.
-[2] Holm, S., A simple sequentially rejective multiple test procedure, Scandinavian
-Journal of Statistics 6, 1979.
-[3] Fisher, R. A., Statistical Methods for Research Workers, Oliver and Boyd, 1932.
-[4] Barnard, G. A., discussion of The spectral analysis of point processes, Journal of
-the Royal Statistical Society B 25, 1963.
+.. [1] Geisser, S., Predictive Inference: An Introduction, Chapman and Hall, 1993.
+.. [2] Holm, S., A simple sequentially rejective multiple test procedure, Scandinavian
+   Journal of Statistics 6, 1979.
+.. [3] Fisher, R. A., Statistical Methods for Research Workers, Oliver and Boyd, 1932.
+.. [4] Barnard, G. A., discussion of The spectral analysis of point processes, Journal of
+   the Royal Statistical Society B 25, 1963.
 """
 
 from __future__ import annotations

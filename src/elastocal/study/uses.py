@@ -16,10 +16,10 @@ share.
 
 References
 ----------
-[1] ISO 9283:1998, Manipulating industrial robots: Performance criteria and related test
-methods.
-[2] van der Vaart, A. W., Asymptotic Statistics, chapters 3 and 21, Cambridge University
-Press, 1998.
+.. [1] ISO 9283:1998, Manipulating industrial robots: Performance criteria and related test
+   methods.
+.. [2] van der Vaart, A. W., Asymptotic Statistics, chapters 3 and 21, Cambridge University
+   Press, 1998.
 """
 
 from __future__ import annotations

@@ -127,10 +127,12 @@ def link_geometry(
     link = joint + 1
     # The catalogue counts along the axes at the far end of the link.
     parameters = name_components(
-        "d", robot.arm.stretches[link].rotation.T @ vector
+        "d", robot.arm.links[link].rotation.T @ vector
     ) | name_components("r", turn)
     return change_part(
-        robot, "structure", wrong=robot.structure.wrong | {link: (vector, turn)}
+        robot,
+        "structure",
+        geometry_errors=robot.structure.geometry_errors | {link: (vector, turn)},
     ), parameters
 
 
@@ -148,7 +150,7 @@ def link_weight(
         heavy = LinkMass(
             link,
             size,
-            tuple(along * robot.arm.stretches[link].vector_m + aside),
+            tuple(along * robot.arm.links[link].vector_m + aside),
             along=along,
         )
         return change_part(
@@ -698,7 +700,7 @@ def setup_step(robot: SimulatedRobot, size: float, draws: Draws) -> DefectiveRob
 def nest_eccentricity(
     robot: SimulatedRobot, size: float, draws: Draws
 ) -> DefectiveRobot:
-    turns = robot.arm.stretches[-1].rotation.T @ robot.arm.axes[-1]
+    turns = robot.arm.links[-1].rotation.T @ robot.arm.axes[-1]
     return change_part(robot, "tracker", nest=(size, int(np.argmax(np.abs(turns))))), {}
 
 

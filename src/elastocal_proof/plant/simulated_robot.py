@@ -1,5 +1,5 @@
-"""A physical robot with its tracker and load cell: all that is true of it, and what a
-tracker without noise would read."""
+"""A simulated robot with its tracker and load cell: all its true properties, and the
+poses that a tracker without noise would read."""
 
 from __future__ import annotations
 
@@ -11,38 +11,52 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from elastocal_proof.plant.arm import Arm, draw_true_masses, to_rotation_matrix
+from elastocal_proof.plant.arm import (
+    Arm,
+    LinkMass,
+    draw_true_masses,
+    to_rotation_matrix,
+)
 from elastocal_proof.plant.multibody import (
     Equilibrium,
+    EquilibriumProblem,
     MultibodyModel,
     Structure,
     build_model,
     solve_equilibrium,
 )
 
+# The thermometer on a motor shows a rise by RISE (1 - exp(-t / MOTOR)). The castings
+# follow it with a first-order lag.
 _REFERENCE_C = 20.0
-# A thermometer on a motor shows a rise by RISE (1 - exp(-t / MOTOR)); the castings
-# follow it by a first-order lag.
-_RISE_K = 10.0
-_MOTOR_S = 3000.0
-_LAG_S = 1200.0
-_PULLS = 40
-_SETTLED_N = 1e-9
-# Largest share by which a gear of a specimen is softer or stiffer than the robot file
-# says.
-_SPREAD = 0.15
+_TEMPERATURE_RISE_K = 10.0
+_MOTOR_TIME_S = 3000.0
+_CASTING_LAG_S = 1200.0
+# Upper bound on the corrections of a pull, and the error of the displayed force below
+# which no correction is needed.
+_MAX_PULLS = 40
+_FORCE_TOLERANCE_N = 1e-9
+# Largest relative difference of a specimen's joint compliance from the robot file.
+_COMPLIANCE_SPREAD = 0.15
 
 
 def open_simulation_stream(seed: int, purpose: str) -> np.random.Generator:
-    """Random numbers for one purpose: numpy Generator that depends on the two alone."""
+    """Open a stream of random numbers that depends on the seed and the purpose only."""
     digest = hashlib.sha256(f"plant/{seed}/{purpose}".encode()).digest()
     return np.random.Generator(np.random.PCG64(int.from_bytes(digest[:16], "little")))
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Of all measurements as one body, along and about the base axes, by its course
-    over times (S,), s."""
+    """Motion of all measurements as one rigid body.
+
+    Attributes
+    ----------
+    shift_m, turn_rad
+        Along and about the base axes.
+    course
+        Share of the motion at times (S,), s; constant by default.
+    """
 
     shift_m: tuple[float, ...]
     turn_rad: tuple[float, ...]
@@ -51,18 +65,33 @@ class Motion:
 
 @dataclass(frozen=True)
 class Tracker:
-    """A laser tracker; the default only has noise.
+    """A laser tracker; the default has noise and no other error.
 
-    `sigma_m`, `sigma_m_per_m`: standard deviation of a coordinate is sigma_m +
-    sigma_m_per_m * range. `stand_m`: where it stands, base frame. `frame_turn`:
-    rotation vector of its own axes in the base's. `drift`, `misplaced`: of the base
-    frame as the tracker has it, about its origin; `move`: of the stand, about itself.
-    `refraction_per_m`: bent light: a target at range r is read at r + k r^2. `scale`: a
-    wrong wavelength, at which the frame of the base was measured too: a target at x is
-    read at (1 + s) x. `outliers`: share of the measurements that are off by
-    `outlier_sigmas`. `nest`: (m, axis) of the flange's target whose centre circles
-    twice a turn of the tool, e (cos 2 q_n, sin 2 q_n) across an axis of its frame: from
-    the next axis to the one after that.
+    Attributes
+    ----------
+    sigma_m, sigma_m_per_m
+        The standard deviation of a coordinate is sigma_m + sigma_m_per_m * range.
+    sigma_rad
+        Standard deviation of a rotation.
+    stand_m
+        Position of the stand, base frame.
+    frame_turn
+        Rotation vector of the tracker's own axes in the base's, rad.
+    drift, misplaced
+        Motions of the base frame as the tracker has it, about its origin.
+    move
+        Motion of the stand, about itself.
+    refraction_per_m
+        Bent light: a target at range r is read at r + k r^2.
+    scale
+        Wrong wavelength, with which the frame of the base was measured too: a target at
+        x is read at (1 + s) x.
+    outliers, outlier_sigmas
+        Share of the measurements whose noise is larger, and how many times it is.
+    nest
+        Eccentricity (m, axis) of the flange's reflector nest. The target's centre
+        circles twice per turn of the tool, e (cos 2 q_n, sin 2 q_n) across an axis of
+        the flange's frame: from the next axis to the one after that.
     """
 
     sigma_m: float = 60e-6
@@ -79,15 +108,22 @@ class Tracker:
     outlier_sigmas: float = 8.0
     nest: tuple[float, int] | None = None
 
-    def seen(
+    def observe(
         self,
         position: np.ndarray,
         rotation: np.ndarray,
         time_s: np.ndarray,
         tool_angle: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Poses (S, targets, 3), (S, targets, 3, 3) as read without noise, base frame,
-        m; the flange's last."""
+        """Compute the poses that the tracker would read without noise, base frame.
+
+        Parameters
+        ----------
+        position, rotation : (S, targets, 3) and (S, targets, 3, 3) arrays
+            True poses of the targets, the flange's last, m.
+        time_s, tool_angle : (S,) arrays
+            Time and angle of the last joint, rad.
+        """
         if self.nest:
             radius, axis = self.nest
             circle = np.stack(
@@ -103,73 +139,78 @@ class Tracker:
                 "sij,sj->si", rotation[:, -1], np.roll(circle, axis, axis=-1)
             )
         stand = np.array(self.stand_m)
-        base = np.zeros(3)
         sight = position - stand
-        far = np.linalg.norm(sight, axis=-1, keepdims=True)
-        position = (1.0 + self.scale) * position + self.refraction_per_m * far * sight
-        for motion, about in (
-            (self.drift, base),
+        distance = np.linalg.norm(sight, axis=-1, keepdims=True)
+        refraction = self.refraction_per_m * distance * sight
+        position = (1.0 + self.scale) * position + refraction
+        origin = np.zeros(3)
+        for motion, centre in (
+            (self.drift, origin),
             (self.move, stand),
-            (self.misplaced, base),
+            (self.misplaced, origin),
         ):
-            if motion is not None:
-                course = motion.course(time_s)[:, None]
-                turn = to_rotation_matrix(course * np.array(motion.turn_rad))
-                position = (
-                    np.einsum("sij,stj->sti", turn, position - about)
-                    + about
-                    + (course * motion.shift_m)[:, None]
-                )
-                rotation = turn[:, None] @ rotation
+            if motion is None:
+                continue
+            course = motion.course(time_s)[:, None]
+            turn = to_rotation_matrix(course * np.array(motion.turn_rad))
+            turned = np.einsum("sij,stj->sti", turn, position - centre)
+            position = turned + centre + (course * motion.shift_m)[:, None]
+            rotation = turn[:, None] @ rotation
         return position, rotation
 
     def read(
         self, position: np.ndarray, rotation: np.ndarray, draws: np.random.Generator
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Poses as seen, with noise and outliers."""
-        # A generator each, so that measurements that come later change none that are
-        # there.
-        chance, metres, radians = draws.spawn(3)
-        sigma = self.sigma_at(position)[..., None]
-        large = np.where(
-            chance.random(position.shape[:2]) < self.outliers, self.outlier_sigmas, 1.0
-        )[..., None]
-        position = position + large * sigma * metres.standard_normal(position.shape)
-        return position, to_rotation_matrix(
-            large * self.sigma_rad * radians.standard_normal(position.shape)
-        ) @ rotation
+        """Add noise and outliers to observed poses."""
+        # Three generators, so that further measurements do not change the noise of the
+        # earlier ones.
+        outlier_draws, position_draws, rotation_draws = draws.spawn(3)
+        is_outlier = outlier_draws.random(position.shape[:2]) < self.outliers
+        factor = np.where(is_outlier, self.outlier_sigmas, 1.0)[..., None]
+        sigma_m = self.sigma_at(position)[..., None]
+        position_noise = position_draws.standard_normal(position.shape)
+        rotation_noise = rotation_draws.standard_normal(position.shape)
+        turn = to_rotation_matrix(factor * self.sigma_rad * rotation_noise)
+        return position + factor * sigma_m * position_noise, turn @ rotation
 
     def sigma_at(self, position: np.ndarray) -> np.ndarray:
         """Standard deviation (...) of a coordinate at positions (..., 3), m."""
-        return self.sigma_m + self.sigma_m_per_m * np.linalg.norm(
-            position - np.array(self.stand_m), axis=-1
-        )
+        distance = np.linalg.norm(position - np.array(self.stand_m), axis=-1)
+        return self.sigma_m + self.sigma_m_per_m * distance
 
     def to_tracker_frame(
         self, position: np.ndarray, rotation: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Poses of the base frame, positions (..., 3) in m and rotations (..., 3, 3),
-        in the tracker's."""
-        own = to_rotation_matrix(self.frame_turn)
-        return (position - np.array(self.stand_m)) @ own, own.T @ rotation
+        """Transform positions (..., 3), m, and rotations (..., 3, 3) from the base
+        frame to the tracker's."""
+        axes = to_rotation_matrix(self.frame_turn)
+        return (position - np.array(self.stand_m)) @ axes, axes.T @ rotation
 
 
 @dataclass(frozen=True)
 class LoadCell:
-    """A cell between the pull and the flange, and where it pulls. The default is
-    perfect.
+    """A load cell, and the point where it pulls; the default is perfect.
 
-    The experimenter pulls until the display shows what the plan says; a cell that errs
-    makes the flange feel something else. So the campaign holds what was shown, and the
-    arm deflects by what was felt. `scale`: felt = (1 + scale) shown. `errors`, each
-    (3,): "turn", rotation vector by which the cell is mounted askew: it shows R(turn)^T
-    felt; "bias", N, shown without a force; "shift", m: where the force really acts,
-    from where the plan says. `crosstalk_per_N`: quadratic: shown x gets k F_y F_z, and
-    so on round the axes. `in_flange`: which of the errors are fixed in the flange's
-    axes rather than in the base's. `mount`: in the line of "pull" one number is
-    measured: a force that is wrong acts at the same lever and brings a wrong moment.
-    Between "flange" and tool six are: the forces may be wrong where the moments are
-    right.
+    The experimenter pulls until the display shows the planned force. If the cell errs,
+    the force on the flange is a different one. The campaign therefore records the
+    displayed force, while the arm deflects under the applied one.
+
+    Attributes
+    ----------
+    scale
+        Applied force = (1 + scale) displayed force.
+    errors
+        (3,) each. "turn": rotation vector of a misaligned cell, which displays R(turn)^T
+        times the applied force. "bias": displayed without a force, N. "shift": from the
+        planned to the true point of application, m.
+    crosstalk_per_N
+        Quadratic: the displayed x component gets k F_y F_z, and so on cyclically.
+    in_flange
+        Names of the errors that are fixed in the flange's axes rather than the base's.
+    mount
+        A cell in the line of the "pull" measures one number, so a wrong force acts at
+        the same lever and brings a wrong moment. Between "flange" and tool it measures
+        six, and forces may be wrong while moments are right.
     """
 
     scale: float = 0.0
@@ -178,58 +219,80 @@ class LoadCell:
     in_flange: tuple[str, ...] = ()
     mount: str = "pull"
 
-    def shown(self, felt: np.ndarray, flange_rotation: np.ndarray) -> np.ndarray:
-        """Force on the display for the force that is felt, both (S, 3), N, base
-        axes."""
-        turn, bias = (self._in_base(name, flange_rotation) for name in ("turn", "bias"))
-        askew = np.einsum("sji,sj->si", to_rotation_matrix(turn), felt)
-        crossed = (
-            self.crosstalk_per_N * np.roll(felt, -1, axis=1) * np.roll(felt, -2, axis=1)
+    def compute_displayed_force(
+        self, applied: np.ndarray, flange_rotation: np.ndarray
+    ) -> np.ndarray:
+        """Compute the displayed from the applied force, both (S, 3), N, base axes."""
+        turn = self._get_error("turn", flange_rotation)
+        misaligned = np.einsum("sji,sj->si", to_rotation_matrix(turn), applied)
+        crosstalk = (
+            self.crosstalk_per_N
+            * np.roll(applied, -1, axis=1)
+            * np.roll(applied, -2, axis=1)
         )
-        return askew / (1.0 + self.scale) + bias + crossed
+        bias = self._get_error("bias", flange_rotation)
+        return misaligned / (1.0 + self.scale) + bias + crosstalk
 
-    def felt(
+    def compute_applied_wrench(
         self, force: np.ndarray, lever: np.ndarray, flange_rotation: np.ndarray
     ) -> np.ndarray:
-        """Wrench on the flange (S, 6), which solves shown = cell(felt) by fixed-point
-        iteration: what lacks is pulled more.
+        """Compute the wrench (S, 6) on the flange for which the cell displays a force.
 
-        `force` (S, 3): as shown, N; zeros where nothing pulls. `lever` (S, 3): from the
-        flange's origin to where the plan lets the force act, m. All in base axes.
+        Fixed-point iteration: the experimenter pulls harder by the missing force.
+
+        Parameters
+        ----------
+        force : (S, 3) array
+            Displayed force, N, base axes; zeros if nothing pulls.
+        lever : (S, 3) array
+            From the flange's origin to the planned point of application, m, base axes.
+        flange_rotation : (S, 3, 3) array
+            Axes of the flange in the base frame.
         """
-        found = force.copy()
-        for _ in range(_PULLS):
-            missing = force - self.shown(found, flange_rotation)
-            found += missing
-            if np.abs(missing).max() < _SETTLED_N:
+        applied = force.copy()
+        for _ in range(_MAX_PULLS):
+            missing = force - self.compute_displayed_force(applied, flange_rotation)
+            applied += missing
+            if np.abs(missing).max() < _FORCE_TOLERANCE_N:
                 break
-        felt = np.where(force.any(axis=1, keepdims=True), found, 0.0)
-        moment = np.cross(lever, felt if self.mount == "pull" else force)
-        return np.concatenate(
-            [felt, moment + np.cross(self._in_base("shift", flange_rotation), felt)],
-            axis=1,
-        )
+        applied = np.where(force.any(axis=1, keepdims=True), applied, 0.0)
+        moment = np.cross(lever, applied if self.mount == "pull" else force)
+        shift = self._get_error("shift", flange_rotation)
+        return np.concatenate([applied, moment + np.cross(shift, applied)], axis=1)
 
-    def _in_base(self, name: str, flange_rotation: np.ndarray) -> np.ndarray:
+    def _get_error(self, name: str, flange_rotation: np.ndarray) -> np.ndarray:
         """An error in base axes, (S, 3)."""
         error = np.array(self.errors.get(name, (0.0, 0.0, 0.0)))
-        return (
-            flange_rotation @ error
-            if name in self.in_flange
-            else np.tile(error, (len(flange_rotation), 1))
-        )
+        if name in self.in_flange:
+            return flange_rotation @ error
+        return np.tile(error, (len(flange_rotation), 1))
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """What is done with a robot, S states in the order of time.
+    """What an experimenter does with a robot of n joints, S states in order of time.
 
-    `angle` (S, n): as the controller believes, rad. `force`, `lever` (S, 3): as the
-    load cell shall show it, N, and from the flange's origin to where it acts, m; base
-    axes. `pose`, `load`, `repeat` (S,) of int. `approach` (S,) of int: number of the
-    move that led there. `sense` (S, n) of int: in which each joint moved last.
-    `previous` (S,) of int: state before, where only the load was changed; -1 after a
-    move. `time_s` (S,). `training` (S,) of bool: not held out for the test.
+    Attributes
+    ----------
+    angle : (S, n) array
+        Joint angles as the controller reports them, rad.
+    force, lever : (S, 3) arrays
+        Force that the load cell shall display, N, and vector from the flange's origin
+        to its point of application, m; base axes.
+    pose, load, repeat : (S,) int arrays
+        Numbers of the pose, of its load, and of the repeat.
+    approach : (S,) int array
+        Number of the move that led to the state.
+    sense : (S, n) int array
+        Direction in which each joint moved last, -1 or 1.
+    previous : (S,) int array
+        Preceding state if only the load was changed; -1 after a move.
+    time_s : (S,) array
+        Time of the measurement.
+    training : (S,) bool array
+        False for held-out poses.
+    seed : int
+        Seed of all random numbers of the campaign.
     """
 
     angle: np.ndarray
@@ -247,31 +310,52 @@ class Schedule:
 
 
 def compute_logged_temperature(time_s: np.ndarray) -> np.ndarray:
-    """Of the thermometer at times (S,), °C."""
-    return _REFERENCE_C - _RISE_K * np.expm1(-time_s / _MOTOR_S)
+    """Compute the thermometer's reading at times (S,), °C."""
+    return _REFERENCE_C - _TEMPERATURE_RISE_K * np.expm1(-time_s / _MOTOR_TIME_S)
 
 
 def compute_casting_warming(time_s: np.ndarray) -> np.ndarray:
-    """By how much the links are warmer than 20 °C at times (S,), K."""
-    rest = (
-        _MOTOR_S * np.exp(-time_s / _MOTOR_S) - _LAG_S * np.exp(-time_s / _LAG_S)
-    ) / (_MOTOR_S - _LAG_S)
-    return _RISE_K * (1.0 - rest)
+    """Compute how much warmer than 20 °C the links are at times (S,), K."""
+    remaining = (
+        _MOTOR_TIME_S * np.exp(-time_s / _MOTOR_TIME_S)
+        - _CASTING_LAG_S * np.exp(-time_s / _CASTING_LAG_S)
+    ) / (_MOTOR_TIME_S - _CASTING_LAG_S)
+    return _TEMPERATURE_RISE_K * (1.0 - remaining)
 
 
 @dataclass(frozen=True)
 class SimulatedRobot:
-    """All that is true of a robot and its instruments; the default is faultless.
+    """All true properties of a robot and its instruments; the default is faultless.
 
-    `compliance` (n,): the gears' own, rad/(N m). Laws of what was done, each of a joint
-    from 0: `drives`: what a drive errs by, (S,), rad; `gears`: what a gear turns by
-    beyond its linear spring, (S,), rad, by the torques on all gears (S, n), N m, now
-    and before the external load came on. `springs`: what a structural spring, by the
-    start of its name, yields beyond its compliance, (S,), rad or m, by its force (S,),
-    N m or N. `expansion_per_K`: of the column and of the flange; in between it changes
-    evenly from stretch to stretch. No defects, as every arm has them:
-    `repeatability_rad` (n,): each approach ends a little elsewhere; `pose_rad` (n,): an
-    error of the angles common to all measurements of a pose.
+    Attributes
+    ----------
+    arm : Arm
+        As its robot file describes it.
+    compliance : (n,) array
+        True compliances of the gears, rad/(N m).
+    structure : Structure
+        Other elasticity, weights and geometry errors.
+    gears : tuple of (joint, law)
+        Rotation of a gear beyond its linear spring, (S,), rad, from the schedule and
+        the torques on all gears, (S, n), N m, now and before the external load was
+        applied. Joints count from 0.
+    drives : tuple of (joint, law)
+        Error of a drive, (S,), rad, from the schedule.
+    springs : tuple of (prefix, law)
+        Deflection of structural springs, by the first letters of their names, beyond
+        their compliance, (S,), rad or m, from the schedule and their force (S,), N m or
+        N.
+    expansion_per_K : tuple
+        Thermal expansion of the column and of the flange; it varies linearly from link
+        to link.
+    cell, tracker
+        Instruments.
+    repeatability_rad : (n,) tuple
+        Standard deviation of the angles from approach to approach. Like the next one,
+        this is no defect: all arms have it.
+    pose_rad : (n,) tuple
+        Standard deviation of the error of the angles that all measurements of a pose
+        share.
     """
 
     arm: Arm
@@ -290,56 +374,67 @@ class SimulatedRobot:
 
 
 def draw_specimen(
-    arm: Arm, seed: int, weighs: bool = True, off_line_m: float = 0.0
+    arm: Arm, seed: int, *, weighs: bool = True, off_line_m: float = 0.0
 ) -> SimulatedRobot:
-    """One faultless robot of a series: other gears than the robot file says, and other
-    weights, or none that it feels.
+    """Draw a faultless robot of a series, whose gears and weights differ from the file.
 
-    `off_line_m`: by how much centres of mass lie off the lines of their links at most,
-    across each, beyond what is declared.
+    Parameters
+    ----------
+    arm, seed
+        Robot file and seed of the specimen.
+    weighs
+        False for an arm without weight.
+    off_line_m
+        Largest undeclared offset of a centre of mass from the line of its link, in each
+        direction across.
     """
     compliance = arm.compliance * open_simulation_stream(seed, "specimen").uniform(
-        1.0 - _SPREAD, 1.0 + _SPREAD, arm.joints
+        1.0 - _COMPLIANCE_SPREAD, 1.0 + _COMPLIANCE_SPREAD, arm.joints
     )
-    masses = (
-        draw_true_masses(
+    masses: tuple[LinkMass, ...] = ()
+    if weighs:
+        masses = draw_true_masses(
             arm,
             open_simulation_stream(seed, "weights"),
             off_line_m,
             open_simulation_stream(seed, "centres off the line"),
         )
-        if weighs
-        else ()
-    )
-    return SimulatedRobot(
-        arm, compliance, Structure(masses=masses, gravity_m_s2=arm.gravity_m_s2)
-    )
+    structure = Structure(masses=masses, gravity_m_s2=arm.gravity_m_s2)
+    return SimulatedRobot(arm, compliance, structure)
 
 
 def simulate_poses(
     robot: SimulatedRobot, schedule: Schedule, start: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Poses of all targets (S, targets, 3), (S, targets, 3, 3) as a tracker without
-    noise reads them, base frame, m.
+    """Simulate the poses that a tracker without noise reads.
 
-    `start` (S, n): deflections of the gears of a robot that differs little; saves time.
+    Parameters
+    ----------
+    robot, schedule
+        The robot, and the S states into which it is brought.
+    start : (S, n) array, optional
+        Deflections of the gears of a similar robot, from which the iteration starts;
+        saves time.
+
+    Returns
+    -------
+    position, rotation : (S, targets, 3) and (S, targets, 3, 3) arrays
+        All targets, m, base frame.
     """
-    _, _, position, rotation = simulate_equilibrium(robot, schedule, start)[1]
-    return robot.tracker.seen(
-        position, rotation, schedule.time_s, schedule.angle[:, -1]
+    rest = simulate_equilibrium(robot, schedule, start)[1]
+    return robot.tracker.observe(
+        rest.position, rest.rotation, schedule.time_s, schedule.angle[:, -1]
     )
 
 
 def simulate_equilibrium(
     robot: SimulatedRobot, schedule: Schedule, start: np.ndarray | None = None
 ) -> tuple[MultibodyModel, Equilibrium]:
-    """The arm, and its equilibrium as of `machine.solve_equilibrium`; arguments as of
-    `seen_poses`."""
-    machine = build_model(robot.arm, robot.structure)
-    felt = partial(robot.cell.felt, schedule.force, schedule.lever)
-    growth = compute_casting_warming(schedule.time_s)[:, None] * np.linspace(
-        *robot.expansion_per_K, robot.arm.joints + 1
-    )
+    """Build the arm's model and find where it comes to rest in each state.
+
+    Parameters are those of `simulate_poses`.
+    """
+    expansion = np.linspace(*robot.expansion_per_K, robot.arm.joints + 1)
 
     def gear_deflection(torque: np.ndarray, unloaded: np.ndarray) -> np.ndarray:
         turn = robot.compliance * torque
@@ -347,32 +442,31 @@ def simulate_equilibrium(
             turn[:, joint] += law(schedule, torque, unloaded)
         return turn
 
-    springs = [(name, partial(law, schedule)) for name, law in robot.springs]
-    return machine, solve_equilibrium(
-        machine,
-        compute_drive_angles(robot, schedule),
-        felt,
-        growth,
-        gear_deflection,
-        springs,
-        start,
+    problem = EquilibriumProblem(
+        drive=compute_drive_angles(robot, schedule),
+        growth=compute_casting_warming(schedule.time_s)[:, None] * expansion,
+        applied_wrench=partial(
+            robot.cell.compute_applied_wrench, schedule.force, schedule.lever
+        ),
+        gear_deflection=gear_deflection,
+        spring_laws=[(name, partial(law, schedule)) for name, law in robot.springs],
     )
+    model = build_model(robot.arm, robot.structure)
+    return model, solve_equilibrium(model, problem, start)
 
 
 def compute_drive_angles(robot: SimulatedRobot, schedule: Schedule) -> np.ndarray:
-    """Where the drives really stand (S, n), rad."""
+    """Compute the true angles (S, n) of the drives, rad."""
     drive = schedule.angle.copy()
     for joint, law in robot.drives:
         drive[:, joint] += law(schedule)
-    # Each with random numbers of its own, by the seed of what is done.
-    for sigma, number, group in (
+    # The second number separates the two streams of random numbers.
+    for sigma_rad, stream_number, group in (
         (robot.repeatability_rad, 11, schedule.approach),
         (robot.pose_rad, 13, schedule.pose),
     ):
-        if any(sigma):
-            draws = np.random.default_rng([schedule.seed, number])
-            drive += (
-                np.array(sigma)
-                * draws.standard_normal((int(group.max()) + 1, robot.arm.joints))[group]
-            )
+        if any(sigma_rad):
+            draws = np.random.default_rng([schedule.seed, stream_number])
+            shape = (int(group.max()) + 1, robot.arm.joints)
+            drive += np.array(sigma_rad) * draws.standard_normal(shape)[group]
     return drive
