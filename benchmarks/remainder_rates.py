@@ -133,15 +133,8 @@ if __name__ == "__main__":
             alone = compute_position_residuals(
                 *transfer_fit(fitted, case, held_out), held_out.observations
             )
-            validated = validate_residual_model(
-                fitted,
-                case,
-                held_out,
-                "auto",
-                blocks=False,
-                within_range=True,
-                seed=seed,
-            )
+            plan = ResidualModelPlan("auto", blocks=False, within_range=True, seed=seed)
+            validated = validate_residual_model(fitted, case, held_out, plan)
             squares = [
                 (residual**2).sum(axis=1)
                 for residual in (alone, validated.residual, chance)
