@@ -17,7 +17,7 @@ from elastocal.study.jobs import read_printed_figures
 
 # Readers of inputs by their names; all other inputs are CSV tables.
 READERS = {
-    "metrics": partial(read_robot_tables, schema=make_metrics_schema),
+    "metrics": partial(read_robot_tables, build_schema=make_metrics_schema),
     "printed": read_printed_figures,
 }
 
