@@ -17,7 +17,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from elastocal.errors import InputError
-from elastocal.io.atomic_writes import atomic_write
+from elastocal.io.atomic_writes import write_atomically
 from elastocal.io.texts import check_file
 
 # One value or an array for each column.
@@ -96,7 +96,7 @@ def write_table(
         "use_byte_stream_split": [name for name in is_float if is_float[name]],
     }
     with (
-        atomic_write(path) as partial,
+        write_atomically(path) as partial,
         pq.ParquetWriter(partial, fields, **options) as writer,
     ):
         for block in blocks:
