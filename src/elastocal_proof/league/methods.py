@@ -232,15 +232,13 @@ def predict_held_out(
         model, estimate = transfer_fit(fitted, case, held_out)
         residual = compute_position_residuals(model, estimate, observed)
     else:
-        prediction = validate_residual_model(
-            fitted,
-            case,
-            held_out,
+        plan = ResidualModelPlan(
             method.regression,
             blocks=split != RANDOM,
             within_range=method.within_range,
             seed=seed,
         )
+        prediction = validate_residual_model(fitted, case, held_out, plan)
         residual = prediction.residual
         std = prediction.std
     if std is None:
