@@ -497,8 +497,8 @@ class HalfWidths:
 
 
 @dataclass(frozen=True)
-class Remainder:
-    """A regression on the residuals of the final model, judged on validation poses.
+class RegressionChoice:
+    """A regression on the residuals of a model, chosen by its training poses.
 
     Attributes
     ----------
@@ -512,6 +512,22 @@ class Remainder:
         Scale of its intervals.
     left_out : CrossValidatedGain or None
         Its gain; None with too few configurations.
+    """
+
+    regression: str
+    words: str
+    seed: int
+    setting: dict[str, Any] | None
+    spread: Spread | None
+    left_out: CrossValidatedGain | None
+
+
+@dataclass(frozen=True)
+class Remainder(RegressionChoice):
+    """A regression on the residuals of the final model, judged on validation poses.
+
+    Attributes
+    ----------
     errors : ErrorSummary
         Errors of the validation poses with it.
     rms_ci95_m, reduction_ci95 : tuple of float
@@ -527,12 +543,6 @@ class Remainder:
         Sizes of these intervals.
     """
 
-    regression: str
-    words: str
-    seed: int
-    setting: dict[str, Any] | None
-    spread: Spread | None
-    left_out: CrossValidatedGain | None
     errors: ErrorSummary
     rms_ci95_m: tuple[float, float]
     reduction_ci95: tuple[float, float]
