@@ -94,12 +94,12 @@ from elastocal.effects.catalogue import candidates_on, list_bundled_effects, lis
 from elastocal.exchange.controllers import axes_of, find_controller, targets_of
 from elastocal.io.origin import environment
 from elastocal.loop.loading import load_campaign
-from elastocal.mechanics.sites import sites_of
+from elastocal.mechanics.sites import build_sites
 from elastocal.residual_model.regressions import Inputs, list_regressions
 
 config, folder = map(Path, sys.argv[1:])
 robots = config / "robots"
-candidates = candidates_on(sites_of(read_robot(robots / "ur10.yaml")))
+candidates = candidates_on(build_sites(read_robot(robots / "ur10.yaml")))
 source = find_importer("workshop", config, "a test")
 rows = np.hstack([np.arange(72.0).reshape(12, 6), np.arange(36.0).reshape(12, 3)])
 np.savetxt(folder / "values.txt", rows)

@@ -37,7 +37,7 @@ class Conditions:
 
     `compliance` (n,): joint compliances, rad/(N m). `joint_angles` (S, n): as
     commanded, rad. `wrench` (S, 6): N, N m, at the last measuring point, base axes.
-    `motion`: of `Sites.followed`. `mass_corrections` (4 m,): by how much each of the
+    `motion`: of `Sites.tracked_points`. `mass_corrections` (4 m,): by how much each of the
     declared masses is off its robot file, kg, and then its first moments along the axes
     of its frame beyond what goes with the mass, kg m. `approach` (S, n). `time_s` (S,):
     since the first measurement to which the model was fitted. `temperature_c` (S,).
@@ -81,7 +81,7 @@ class Conditions:
         acting = wrench.T.copy()
         acting[3:] += np.cross(self.motion.position[0], acting[:3], axis=0)
         return self.motion.generalized_forces(
-            self.sites.followed[0].after, acting, coordinates
+            self.sites.tracked_points[0].after, acting, coordinates
         ).T
 
     @cached_property
@@ -89,9 +89,11 @@ class Conditions:
         """Generalized force of the declared masses on every coordinate of the sites,
         ndarray (S, C)."""
         masses, first_moments = self._masses_and_first_moments()
-        bodies = self.sites.followed[self.sites.joints + 2 :]
+        bodies = self.sites.tracked_points[self.sites.joints + 2 :]
         _, coordinates, states = self.motion.twist.shape
-        is_carried = self.motion.place[:, None] < [body.after for body in bodies]
+        is_carried = self.motion.transform_index[:, None] < [
+            body.after for body in bodies
+        ]
         # Neighbouring coordinates that carry the same masses have one wrench.
         is_edge = (is_carried[1:] != is_carried[:-1]).any(axis=1)
         edges = np.flatnonzero(is_edge) + 1
@@ -113,7 +115,7 @@ class Conditions:
         centres = [mass.centre_m for mass in self.sites.masses]
         masses = declared + corrections[:, 0]
         local_moments = masses[:, None] * centres + corrections[:, 1:]
-        bodies = slice(self.sites.joints + 2, len(self.sites.followed))
+        bodies = slice(self.sites.joints + 2, len(self.sites.tracked_points))
         position = self.motion.position[bodies]
         rotation = self.motion.rotation[bodies]
         first_moments = masses[:, None, None] * position + sum(
@@ -131,13 +133,13 @@ class Conditions:
         Yields for each mass (4, K', S), of the first of the coordinates, which it
         loads.
         """
-        place = self.motion.place[coordinates]
+        place = self.motion.transform_index[coordinates]
         twist = self.motion.twist[:, coordinates]
         gravity = np.array(self.sites.gravity_m_s2)
         by_kilogram = np.tensordot(gravity, twist[:3], 1)
         for body, mass in enumerate(self.sites.masses, self.sites.joints + 2):
             rotation = self.motion.rotation[body]
-            loaded = np.searchsorted(place, self.sites.followed[body].after)
+            loaded = np.searchsorted(place, self.sites.tracked_points[body].after)
             centre = self.motion.position[body] + np.tensordot(
                 mass.centre_m, rotation, (0, 1)
             )
@@ -164,11 +166,11 @@ class Conditions:
     def usual_gravity(self) -> np.ndarray:
         """Generalized force of the usual masses on every coordinate beyond the joints,
         whose sag has its own law; (S, C)."""
-        found = np.zeros((self.motion.place.size, len(self.wrench)))
-        for end, mass in enumerate(self.sites.usual_masses, 1):
+        found = np.zeros((self.motion.transform_index.size, len(self.wrench)))
+        for end, mass in enumerate(self.sites.typical_masses_kg, 1):
             falling = self._falling(mass, mass * self.motion.position[end])
             found += self.motion.generalized_forces(
-                self.sites.followed[end].after, falling
+                self.sites.tracked_points[end].after, falling
             )
         found[: self.sites.joints] = 0.0
         return found.T
@@ -177,7 +179,7 @@ class Conditions:
     def total(self) -> np.ndarray:
         """External load and weight of the declared masses, or of usual ones, on every
         coordinate of the sites, (S, C)."""
-        if self.sites.usual_weight:
+        if self.sites.bears_typical_weight:
             weight = self.usual_gravity
         elif self.sites.masses:
             weight = self.gravity
@@ -215,7 +217,7 @@ class Conditions:
         )
         falling = self._falling(float(axis is None), first)
         return self.motion.generalized_forces(
-            self.sites.followed[end].after, falling, slice(self.sites.joints)
+            self.sites.tracked_points[end].after, falling, slice(self.sites.joints)
         ).T
 
 
@@ -258,7 +260,7 @@ def conditions_of(
         np.asarray(compliance),
         states.joint_angles,
         states.wrench,
-        compute_motion(sites.chain, coordinates, sites.followed),
+        compute_motion(sites.chain, coordinates, sites.tracked_points),
         np.zeros(MASS_PARAMETERS * len(sites.masses))
         if mass_corrections is None
         else mass_corrections,
@@ -336,7 +338,7 @@ def offered(sites: Sites, states: States) -> frozenset[str]:
         states.temperature_c is not None and np.ptp(states.temperature_c) > 0
     )
     is_offered = {
-        "load": sites.usual_weight or loaded,
+        "load": sites.bears_typical_weight or loaded,
         "load on the joints": loaded,
         "external load": external,
         "approach": has_approach,
