@@ -54,7 +54,7 @@ def make_run(folder):
             wrench = np.concatenate([force, np.cross([0, 0.5, 0], force)])
             still, moved = (
                 arm.pose(at, "hand")
-                for at in (q, arm.loaded(arm.springs, q, wrench, 1)[0])
+                for at in (q, arm.deflect(arm.springs, q, wrench, 1)[0])
             )
             experiments.append([data_set, k, *q, *wrench])
             deflections.append(
