@@ -38,24 +38,23 @@ def check_simulated_campaign(
     plan = yaml.safe_load(path.read_text("utf-8")) if path.is_file() else {}
     if plan.get("source") != "simulated":
         return
-    robot = (config / f"robots/{plan['robot']}.yaml").read_text("utf-8")
-    arm = Arm(yaml.safe_load(robot))
+    path = config / f"robots/{plan['robot']}.yaml"
+    arm = Arm(yaml.safe_load(path.read_text("utf-8")))
     stream = open_philox_stream(run.seed, campaign, "campaign")
     visits, angles, wrenches = _draw_visits(arm, plan, stream)
     deflected = [
         arm.deflect(arm.springs, q, wrench, 1)[0]
         for q, wrench in zip(angles, wrenches, strict=True)
     ]
-    table = run.table(file)
     for point in plan["points"]:
-        position_noise = plan["noise_m"] * stream.standard_normal((len(visits), 3))
-        rotation_noise = plan["noise_rad"] * stream.standard_normal((len(visits), 3))
+        noise = plan["noise_m"] * stream.standard_normal((len(visits), 3))
+        turns = plan["noise_rad"] * stream.standard_normal((len(visits), 3))
         measured = []
         for number, coordinates in enumerate(deflected):
             position, rotation = arm.pose(coordinates, point)
-            turned = pin.log3(pin.exp3(rotation_noise[number]) @ rotation)
-            measured.append([*(position + position_noise[number]), *turned])
-        rows = table[table["target"] == point]
+            rotation = pin.exp3(turns[number]) @ rotation
+            measured.append([*(position + noise[number]), *pin.log3(rotation)])
+        rows = run.table(file).query("target == @point")
         for name, columns, expected in (
             ("visits", ["pose", "load", "repeat"], visits),
             ("wrenches", WRENCH, wrenches),

@@ -278,10 +278,10 @@ def take_least_squares_step(
     """
     averages = average_repeats(campaign, training)
     residual, jacobian, forces = compute_residuals(campaign, model.springs, averages)
-    slopes = np.einsum(
+    rows = np.einsum(
         "mrc,pcd,md->mrp", jacobian, model.derivatives, forces, optimize=True
     )
-    rows = np.concatenate([slopes, residual[:, :, None]], axis=2)
+    rows = np.concatenate([rows, residual[:, :, None]], axis=2)
     rows, scatter = _weigh_rows(
         rows, model.noise, averages, jacobian[:, :, : campaign.arm.joints]
     )

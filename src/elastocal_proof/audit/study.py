@@ -63,20 +63,21 @@ def _draw_experiments(
     "identification" or "test"."""
     settings = run.configuration
     arm = run.arm(robot)
-    low = np.full(arm.joints, -np.pi)
-    high = np.full(arm.joints, np.pi)
+    limits = np.array([-np.pi, np.pi])
     if settings["interpretations"]["joint_range"] == "limits":
-        low, high = np.deg2rad(run.robots[robot]["joint_limits_deg"]).T
+        limits = np.deg2rad(run.robots[robot]["joint_limits_deg"])
     stream = open_philox_stream(run.seed, robot, f"{use}/joint angles", data_set)
-    angles = low + (high - low) * stream.random((count, arm.joints))
+    angles = limits[..., 0] + np.diff(limits)[..., 0] * stream.random(
+        (count, arm.joints)
+    )
     stream = open_philox_stream(run.seed, robot, f"{use}/force", data_set)
     normal = stream.standard_normal((count, 3))
     force = settings["loading"]["force_N"] * normal
     force /= np.linalg.norm(normal, axis=1)[:, None]
-    lever = np.tile(np.array(settings["loading"]["offset_m"], float), (count, 1))
+    lever = np.array(settings["loading"]["offset_m"], float)
     if settings["interpretations"]["offset_frame"] == "tool":
-        rotations = [arm.pose(arm.extend(q), arm.points[-1])[1] for q in angles]
-        lever = np.einsum("kij,kj->ki", rotations, lever)
+        poses = [arm.pose(arm.extend(q), arm.points[-1]) for q in angles]
+        lever = np.array([rotation @ lever for _, rotation in poses])
     return angles, np.concatenate([force, np.cross(lever, force)], axis=1)
 
 
