@@ -47,7 +47,7 @@ onstart:
 
 
 onsuccess:
-    for line in outcome(snakemake_internals.files_of_jobs(workflow)):
+    for line in describe_outcome(snakemake_internals.files_of_jobs(workflow)):
         logger.info(line)
 
 

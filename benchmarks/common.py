@@ -1,5 +1,4 @@
-"""What the benchmarks share: a row of the report, interleaved timing, and the robots
-and strategies of the repository."""
+"""Rows of the report, interleaved timing, and robots and strategies for benchmarks."""
 
 import resource
 import time
@@ -16,19 +15,28 @@ from elastocal.mechanics.robot_file import parse_robot
 from elastocal.study.strategies import Strategy, strategy_from_document
 
 ROOT = Path(__file__).resolve().parents[1]
-# Seconds of `_yardstick` where limits in seconds are stated: two idle cores of an AMD
-# EPYC; CPU time, the least of 40.
+# Seconds of `_yardstick` on the machine for which limits in seconds are stated: two idle
+# cores of an AMD EPYC, the smallest CPU time of 40 runs.
 YARDSTICK_S = 0.14
-Found = TypeVar("Found")
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
 class Row:
     """One line of reports/benchmarks.csv.
 
-    `benchmark`: its first word is the module that measures it. `ours_s`, `theirs_s`:
-    seconds; none where the benchmark does not compare times. `target`: what the ratio
-    should be; empty for a row that informs only. `how`: one sentence.
+    Attributes
+    ----------
+    benchmark : str
+        Its first word is the module that measures it.
+    ours_s, theirs_s : float, optional
+        Seconds; None if the benchmark does not compare times.
+    ratio : float
+    target : str
+        Required ratio; empty if there is none.
+    holds : bool, optional
+    how : str
+        One sentence on the measurement.
     """
 
     benchmark: str
@@ -43,7 +51,7 @@ class Row:
     def of_limit(
         cls, benchmark: str, seconds: float, allowed_s: float, how: str
     ) -> "Row":
-        """Seconds against those that are allowed on this machine."""
+        """Compare seconds with those that are allowed on this machine."""
         return cls(
             benchmark,
             seconds,
@@ -58,51 +66,66 @@ class Row:
 def interleaved(
     functions: Mapping[str, Callable[[], Any]], repetitions: int
 ) -> list[list[float]]:
-    """CPU seconds of several functions without arguments, by the names to print, their
-    processes included; a list for each.
+    """Measure the CPU seconds of several functions, including their processes.
 
-    They are called in turn so that a busy spell of the machine hits all of them. Other
-    processes only ever add to them: the least of a few is the function's own
-    (documentation of `timeit`).
+    The functions are called in turn, so that a busy spell of the machine affects all of
+    them. Other processes can only add to a time, so the smallest of several is that of
+    the function itself (documentation of `timeit`).
+
+    Parameters
+    ----------
+    functions : mapping
+        Functions without arguments by the names to print.
+    repetitions : int
+
+    Returns
+    -------
+    list of lists
+        Seconds of all calls, a list for each function.
     """
     seconds: list[list[float]] = [[] for _ in functions]
     for repetition in range(1, repetitions + 1):
-        for taken, function in zip(seconds, functions.values(), strict=True):
+        for times, function in zip(seconds, functions.values(), strict=True):
             start = _cpu_seconds()
             function()
-            taken.append(_cpu_seconds() - start)
+            times.append(_cpu_seconds() - start)
         last = ", ".join(
-            f"{name} {taken[-1]:.3f} s"
-            for name, taken in zip(functions, seconds, strict=True)
+            f"{name} {times[-1]:.3f} s"
+            for name, times in zip(functions, seconds, strict=True)
         )
         print(f"  {repetition}/{repetitions}: {last}", flush=True)
     return seconds
 
 
 def _cpu_seconds() -> float:
-    """Of this process and those that it has ended."""
-    used = [
+    """CPU seconds of this process and of its ended child processes."""
+    usages = [
         resource.getrusage(who)
         for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
     ]
-    return sum(each.ru_utime + each.ru_stime for each in used)
+    return sum(usage.ru_utime + usage.ru_stime for usage in usages)
 
 
-def beside_yardstick(function: Callable[[], Found]) -> tuple[Found, float]:
-    """What a function returns, and how many times as long this machine takes as the one
-    for which limits in seconds are stated.
+def beside_yardstick(function: Callable[[], Result]) -> tuple[Result, float]:
+    """Call a function, and compare this machine with that of the stated limits.
 
-    A fixed piece of work just before and just after says so: a machine that is slow, or
-    busy, is allowed more.
+    A fixed piece of work is timed just before and just after the call, so that a slow
+    or busy machine is allowed more time.
+
+    Returns
+    -------
+    result
+        Return value of the function.
+    float
+        How many times as long this machine takes for the same work.
     """
     before = _yardstick()
-    found = function()
-    return found, (before + _yardstick()) / 2 / YARDSTICK_S
+    result = function()
+    return result, (before + _yardstick()) / 2 / YARDSTICK_S
 
 
 def _yardstick() -> float:
-    """Seconds of least-squares problems of the engine's size, the mean of three
-    rounds."""
+    """Time least-squares problems of the engine's size; mean seconds of three rounds."""
     rounds = 3
     matrix = np.random.default_rng(1).standard_normal((200, 40))
     start = time.perf_counter()
@@ -112,13 +135,13 @@ def _yardstick() -> float:
 
 
 def load_robot(name: str) -> Robot:
-    """Robot of config/robots."""
+    """Load a robot of config/robots."""
     path = ROOT / "config" / "robots" / f"{name}.yaml"
     return parse_robot(read_document(path), path.name)
 
 
 def load_strategy(name: str) -> Strategy:
-    """Strategy of config/strategies."""
+    """Load a strategy of config/strategies."""
     return strategy_from_document(
         read_document(ROOT / "config" / "strategies" / f"{name}.yaml")
     )

@@ -1,6 +1,8 @@
-"""The diagnosing engine: a fit against one dense least-squares problem of its size, a
-case of the blind proof, growth with rows, and campaigns of thousands and a million
-measurements.
+"""Benchmark the diagnosis.
+
+A fit is compared with one dense least-squares problem of its size. A case of the blind
+benchmark, the growth with rows, and campaigns of thousands and a million measurements
+have limits.
 
 A case and a large campaign are diagnosed and judged by a process of their own, from
 folder to verdict, which notes its peak memory at the end (Linux).
@@ -25,18 +27,18 @@ from elastocal.fitting.least_squares import fit_model, register_placement
 from elastocal.fitting.model import list_parameters
 from elastocal.fitting.noise import estimate_noise
 from elastocal.io.documents import read_document
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import read_cases
 from elastocal_proof.blind.cases import list_cases, write_sealed_case
 from elastocal_proof.blind.folders import build_campaign_document, write_robot_file
-from elastocal_proof.plant.arm import arm_from_file
-from elastocal_proof.plant.campaigns import Design, measured_table, schedule_of
-from elastocal_proof.plant.kinds import Defect, with_defects
-from elastocal_proof.plant.physical_robot import specimen
+from elastocal_proof.plant.arm import read_arm
+from elastocal_proof.plant.campaigns import Design, draw_schedule, simulate_measurements
+from elastocal_proof.plant.kinds import Defect, apply_defects
+from elastocal_proof.plant.simulated_robot import draw_specimen
 
 ROBOTS = ROOT / "config" / "robots"
 SEED = 2026
-# Laws that do not depend on the estimate, as most of a measured robot's, of which a fit
-# has many.
+# Effects of the fit. Like most effects of a measured robot, their basis functions do not
+# depend on the estimate.
 FITTED = ("joint_offset", "transmission_harmonic", "bearing_runout", "link_weight")
 LARGE = Design(
     held_out=0,
@@ -75,8 +77,17 @@ print(json.dumps({"seconds": seconds, "peak_gb": peak, "measurements": len(train
 
 @dataclass(frozen=True)
 class Setting:
-    """Measurements of a fit, repetitions, cases, rows of UR10 Series A (None: all), of
-    two campaigns and of a large one."""
+    """Size of the benchmark.
+
+    Attributes
+    ----------
+    fitted : measurements of the fit
+    repetitions : repetitions of the fit
+    cases : cases of the blind benchmark
+    series_a : rows of UR10 Series A; None for all
+    growth : measurements of the two campaigns that are compared
+    million : measurements of the large campaign
+    """
 
     fitted: int
     repetitions: int
@@ -86,25 +97,27 @@ class Setting:
     million: int
 
 
-# The median of a dozen cases lies between two groups of them and jumps by a tenth from
-# run to run. The small setting measures one campaign for all.
+# The median of a dozen cases lies between two groups of cases and changes by a tenth from
+# run to run, so there are more. The small setting measures one campaign for all rows.
 FULL = Setting(6000, 3, 48, None, (20_000, 80_000), 1_000_000)
 SMALL = Setting(1000, 1, 1, 60, (1000, 30_000), 1000)
 
 
 def rows(work: Path, setting: Setting) -> Iterator[Row]:
-    """Rows of the report.
-
-    `work`: temporary folder.
-    """
+    """Measure all rows of the report in a temporary folder."""
     yield _fit(work, setting.fitted, setting.repetitions)
     yield _case(work, setting.cases)
-    few, many = (_run([_large(work, measurements)]) for measurements in setting.growth)
-    (small,), (large,) = few["seconds"], many["seconds"]
-    exponent = float(
-        np.log(large / small) / np.log(many["measurements"] / few["measurements"])
+    small_run, large_run = (
+        _run([_large(work, measurements)]) for measurements in setting.growth
     )
-    how = f"exponent of the CPU time in the rows: {many['measurements']} against {few['measurements']}, from file to verdict"
+    (small,) = small_run["seconds"]
+    (large,) = large_run["seconds"]
+    counts = large_run["measurements"], small_run["measurements"]
+    exponent = float(np.log(large / small) / np.log(counts[0] / counts[1]))
+    how = (
+        "exponent of the CPU time in the rows:"
+        f" {counts[0]} against {counts[1]}, from file to verdict"
+    )
     yield Row(
         "engine growth",
         large,
@@ -118,29 +131,38 @@ def rows(work: Path, setting: Setting) -> Iterator[Row]:
         series = find_importer("ur10_ipa", "config", "the benchmark")
         source = Path(os.environ[FOLDER_VARIABLE], series.files["ur10_ipa_a"].local)
         header, *lines = source.read_text(encoding="utf-8").splitlines(keepends=True)
-        kept = lines[: setting.series_a]
-        (work / "series_a.csv").write_text("".join([header, *kept]), encoding="utf-8")
+        selected = lines[: setting.series_a]
+        text = "".join([header, *selected])
+        (work / "series_a.csv").write_text(text, encoding="utf-8")
         series.write_campaign(
             [work / "series_a.csv"], work / "series_a", "config/robots", "ur10_series_a"
         )
-        how = f"UR10 Series A, {len(kept):,} poses, from its folder to its verdict, one thread as in a job of the workflow"
+        how = (
+            f"UR10 Series A, {len(selected):,} poses, from its folder to its verdict,"
+            " one thread as in a job of the workflow"
+        )
         yield from _limits(
             "engine ur10_series_a", work / "series_a", SERIES_A_S, SERIES_A_GB, how
         )
-    how = f"{setting.million:,} measurements, each a pose of its own, from file to verdict, one thread as in a job"
+    how = (
+        f"{setting.million:,} measurements, each a pose of its own,"
+        " from file to verdict, one thread as in a job"
+    )
     yield from _limits(
         "engine million", _large(work, setting.million), MILLION_S, MILLION_GB, how
     )
 
 
 def _fit(work: Path, measurements: int, repetitions: int) -> Row:
-    """A robust fit of many effects, to its end, against one dense least-squares problem
-    of as many rows and columns."""
-    case, _ = cases_in(_large(work, measurements), ROBOTS)
+    """Compare a robust fit of many effects with one dense least-squares problem.
+
+    The problem has as many rows and columns as the fit.
+    """
+    case, _ = read_cases(_large(work, measurements), ROBOTS)
     effects = tuple(
-        each
-        for each in case.candidates.values()
-        if each.effect in FITTED and not each.shapes
+        candidate
+        for candidate in case.candidates.values()
+        if candidate.effect in FITTED and not candidate.shapes
     )
     model = replace(case.model, effects=(*case.model.effects, *effects))
     noise = estimate_noise(case)[0]
@@ -155,7 +177,10 @@ def _fit(work: Path, measurements: int, repetitions: int) -> Row:
         "numpy.linalg.lstsq": lambda: np.linalg.lstsq(matrix, matrix[:, 0]),
     }
     ours, theirs = map(min, interleaved(functions, repetitions))
-    how = f"a robust fit against one numpy.linalg.lstsq of {size[0]} rows and {size[1]} parameters, least of {repetitions}"
+    how = (
+        f"a robust fit against one numpy.linalg.lstsq of {size[0]} rows and"
+        f" {size[1]} parameters, minimum of {repetitions}"
+    )
     return Row(
         "engine fit",
         ours,
@@ -168,17 +193,19 @@ def _fit(work: Path, measurements: int, repetitions: int) -> Row:
 
 
 def _case(work: Path, cases: int) -> Row:
-    # Development cases: those of the proof stay unseen.
-    some = list_cases(
-        read_document(ROOT / "config" / "blind.yaml"), "development", SEED
-    )[:cases]
-    for case in some:
+    # These are development cases; those of the blind benchmark stay unseen.
+    plan = read_document(ROOT / "config" / "blind.yaml")
+    selected = list_cases(plan, "development", SEED)[:cases]
+    for case in selected:
         write_sealed_case(case, work / "blind", work / "sealed", ROBOTS)
-    # The first pays for the imports.
+    # The first case runs twice, because its first run includes the imports.
     run, slower = beside_yardstick(
-        lambda: _run([work / "blind" / case.name for case in (some[0], *some)])
+        lambda: _run([work / "blind" / case.name for case in (selected[0], *selected)])
     )
-    how = f"median of {cases} cases of the development set, diagnosed and judged in one process, one thread"
+    how = (
+        f"median of {cases} cases of the development set,"
+        " diagnosed and judged in one process, one thread"
+    )
     return Row.of_limit("engine case", median(run["seconds"][1:]), CASE_S * slower, how)
 
 
@@ -201,21 +228,20 @@ def _limits(
 
 
 def _large(work: Path, measurements: int) -> Path:
-    """A campaign of a robot without loads, each measurement a pose of its own, one
-    reflector on the flange."""
+    """Write a campaign without loads, with one reflector and a pose a measurement."""
     folder = work / f"large{measurements}"
     if not folder.is_dir():
         file = ROBOTS / "fanuc.yaml"
-        arm = arm_from_file(file)
-        robot = with_defects(
-            specimen(arm, 4), [Defect("transmission_harmonic", (2,), 1e-4, 1)]
+        arm = read_arm(file)
+        robot = apply_defects(
+            draw_specimen(arm, 4), [Defect("transmission_harmonic", (2,), 1e-4, 1)]
         )
         document = build_campaign_document("large", arm, LARGE) | {
             "compliance": "nominal",
             "holdout": {"fraction": 0.3, "seed": 1},
         }
-        table = measured_table(
-            robot, LARGE, schedule_of(arm, replace(LARGE, poses=measurements), 4)
+        table = simulate_measurements(
+            robot, LARGE, draw_schedule(arm, replace(LARGE, poses=measurements), 4)
         )
         write_campaign(
             folder,
@@ -229,14 +255,14 @@ def _large(work: Path, measurements: int) -> Path:
 
 
 def _run(folders: Sequence[Path]) -> dict[str, Any]:
-    """What a process of its own prints last."""
+    """Diagnose folders in a process of its own, and return what it measures."""
     names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     command = [sys.executable, "-c", SCRIPT, str(ROBOTS), *map(str, folders)]
-    done = subprocess.run(
+    finished = subprocess.run(
         command,
         env=os.environ | dict.fromkeys(names, "1"),
         check=True,
         capture_output=True,
         text=True,
     )
-    return json.loads(done.stdout.splitlines()[-1])
+    return json.loads(finished.stdout.splitlines()[-1])

@@ -71,24 +71,27 @@ def rows(work: Path, setting: Setting) -> list[Row]:
         ]
 
     def loop() -> np.ndarray:
-        found = np.empty((sets, configurations, joints))
+        estimates = np.empty((sets, configurations, joints))
         number = 0
         for matrices, deflections in systems:
             for matrix, deflection in zip(matrices, deflections, strict=True):
                 for length in range(1, configurations + 1):
                     end = ROWS * length
-                    found[number, length - 1] = np.linalg.lstsq(
+                    estimates[number, length - 1] = np.linalg.lstsq(
                         matrix[:end], deflection[:end]
                     )[0]
                 number += 1
-        return found
+        return estimates
 
     _assert_equal(np.concatenate(ours(), axis=2).transpose(2, 0, 1)[..., order], loop())
     alone, theirs = map(
         min, interleaved({"elastocal": ours, "numpy.linalg.lstsq": loop}, repetitions)
     )
-    against = f"a loop of numpy.linalg.lstsq over {sets} data sets and {configurations} prefixes, 6DoF on kuka"
-    how = f"estimate_compliance against {against}, minimum of {repetitions}, equal to {TOLERANCE:g}"
+    how = (
+        f"estimate_compliance against a loop of numpy.linalg.lstsq over {sets} data sets"
+        f" and {configurations} prefixes, 6DoF on kuka, minimum of {repetitions},"
+        f" equal to {TOLERANCE:g}"
+    )
     return [
         Row(
             "identification",

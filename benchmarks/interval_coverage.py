@@ -1,5 +1,6 @@
-"""How often 95 % intervals of held-out errors contain the true value: `python
-benchmarks/interval_coverage.py`, two minutes.
+"""Measure how often 95 % intervals of held-out errors contain the true value.
+
+Run `python benchmarks/interval_coverage.py`, two minutes.
 
 Prints the table of docs/held_out_intervals.md; `--draw PAGE` draws the table of that
 page beside it instead.
@@ -26,7 +27,9 @@ METHODS = ("percentile", "BCa", "ours")
 def main() -> None:
     """Print one line for each kind of errors and number of poses."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--campaigns", type=int, default=400, help="of each line")
+    parser.add_argument(
+        "--campaigns", type=int, default=400, help="number in each line"
+    )
     parser.add_argument("--draw", type=Path, help="a page whose table is drawn")
     given = parser.parse_args()
     if given.draw:
@@ -41,18 +44,17 @@ def main() -> None:
     for kind in KINDS:
         truth = true_figures(kind)
         for poses in POSES:
-            held = covered(kind, poses, campaigns, truth)
-            cells = [
-                " / ".join(f"{100 * held[name, method]:.0f}" for method in METHODS)
-                for name in FIGURES
-            ]
+            coverage = compute_coverage(kind, poses, campaigns, truth)
+            cells = []
+            for name in FIGURES:
+                shares = [f"{100 * coverage[name, method]:.0f}" for method in METHODS]
+                cells.append(" / ".join(shares))
             print(f"| {kind} | {poses} | " + " | ".join(cells) + " |", flush=True)
 
 
 @styled
 def draw(page: Path) -> None:
-    """Draw how often the intervals of the RMS error contain the true value, by the
-    table of a page, as a picture beside it."""
+    """Draw the coverage of the intervals of the RMS error from the table of a page."""
     lines = [
         line.strip("| \n").split(" | ")
         for line in page.read_text(encoding="utf-8").splitlines()
@@ -61,12 +63,8 @@ def draw(page: Path) -> None:
     figure, axes = create_panels(1, len(KINDS), 58, sharey=True)
     for axis, kind in zip(axes[0], KINDS, strict=True):
         rows = [line for line in lines if line[0] == kind]
-        values = np.array(
-            [
-                [float(cell) for cell in row[2 + FIGURES.index("rms_m")].split(" / ")]
-                for row in rows
-            ]
-        )
+        cells = [row[2 + FIGURES.index("rms_m")] for row in rows]
+        values = np.array([cell.split(" / ") for cell in cells], float)
         for column, method in enumerate(METHODS):
             name = "in use" if method == "ours" else method
             axis.plot(
@@ -86,15 +84,15 @@ def draw(page: Path) -> None:
     figure.savefig(page.with_suffix(".png"), metadata={"Software": None}, dpi=150)
 
 
-def covered(
+def compute_coverage(
     kind: str, poses: int, campaigns: int, truth: Mapping[str, float]
 ) -> dict[tuple[str, str], float]:
-    """Shares of campaigns whose intervals contain the true value."""
+    """Compute the share of campaigns whose interval contains the true value."""
     rng = np.random.default_rng(7)
     hits = {}
     for before, after, false in campaigns_of(kind, campaigns, poses, (8, poses)):
-        found = {
-            method: by_scipy(before, after, false, method, rng)
+        intervals = {
+            method: compute_by_scipy(before, after, false, method, rng)
             for method in METHODS[:2]
         }
         limits, reductions = compute_error_intervals([before, after], REPLICATES, rng)
@@ -104,22 +102,22 @@ def covered(
             "reduction": (reductions[1].low, reductions[1].high),
             "reduction of none": (of_none.low, of_none.high),
         }
-        for method, of_method in (found | {"ours": ours}).items():
-            for name, (low, high) in of_method.items():
+        for method, limits_of_method in (intervals | {"ours": ours}).items():
+            for name, (low, high) in limits_of_method.items():
                 hits[name, method] = hits.get((name, method), 0) + (
                     low <= truth[name] <= high
                 )
     return {key: count / campaigns for key, count in hits.items()}
 
 
-def by_scipy(
+def compute_by_scipy(
     before: PositionErrors,
     after: PositionErrors,
     false: PositionErrors,
     method: str,
     rng: np.random.Generator,
 ) -> dict[str, np.ndarray]:
-    """The same intervals by `scipy.stats.bootstrap` over poses."""
+    """Compute the same intervals by `scipy.stats.bootstrap` over poses."""
     cluster = after.cluster
     counts = np.bincount(cluster)
     sums = np.bincount(cluster, after.distance)
@@ -135,7 +133,7 @@ def by_scipy(
     ) -> np.ndarray:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            found = bootstrap(
+            result = bootstrap(
                 samples,
                 statistic,
                 paired=True,
@@ -144,7 +142,7 @@ def by_scipy(
                 method=method,
                 rng=rng,
             )
-        return np.array([found.confidence_interval.low, found.confidence_interval.high])
+        return np.array(result.confidence_interval)
 
     return {
         "mean_m": interval((sums, counts), ratio),

@@ -80,8 +80,8 @@ def _row(name: str, setting: Setting) -> Row:
     expected = np.stack(
         [pin.computeFrameJacobian(model, data, q, frame, aligned) for q in angles]
     )
-    found = compute_poses_and_jacobians(chain, angles, chain.end_effector)[2]
-    np.testing.assert_allclose(found, expected, rtol=0, atol=TOLERANCE)
+    jacobians = compute_poses_and_jacobians(chain, angles, chain.end_effector)[2]
+    np.testing.assert_allclose(jacobians, expected, rtol=0, atol=TOLERANCE)
     functions = {
         f"elastocal on {name}": lambda: compute_poses_and_jacobians(
             chain, angles, chain.end_effector
@@ -90,8 +90,9 @@ def _row(name: str, setting: Setting) -> Row:
     }
     ours, theirs = map(min, interleaved(functions, setting.repetitions))
     how = (
-        f"poses_and_jacobians on {setting.configurations} random configurations against pin.computeFrameJacobian in a Python "
-        f"loop, one thread, least of {setting.repetitions}, Jacobians equal to {TOLERANCE:g}"
+        f"poses_and_jacobians on {setting.configurations} random configurations against"
+        " pin.computeFrameJacobian in a Python loop, one thread,"
+        f" minimum of {setting.repetitions}, Jacobians equal to {TOLERANCE:g}"
     )
     return Row(
         f"kinematics {name}",

@@ -1,26 +1,36 @@
-"""Position errors of two models on held-out poses, as campaigns make them: common to a
-pose, skewed, with poses far off."""
+"""Simulated position errors of two models on held-out poses.
+
+Errors of a pose are correlated; they may be skewed or have outlying poses.
+"""
 
 import numpy as np
 
 from elastocal.validation.held_out import PositionErrors
 
-INTERPRETATIONS = 6
-_MANY = 400_000
+# Kinds of errors: Gaussian and correlated within a pose; with uneven numbers of
+# measurements; skewed; with outlying poses.
+KINDS = ("common", "uneven", "skewed", "far off")
+MEASUREMENTS_A_POSE = 6
+# Poses for the true values of the figures.
+_MANY_POSES = 400_000
 
 
 def made_errors(kind, campaigns, poses, rng):
-    """Errors before and after an effect of 1.5 noises is found but for a tenth, and
-    after one that is none was added.
+    """Draw errors before and after an effect is corrected, and after a false correction.
 
-    Returns `cluster` (M,): the same in all campaigns; `before`, `after`, `false`
-    (campaigns, M).
+    The effect is 1.5 times the noise; a tenth of it remains.
+
+    Returns
+    -------
+    cluster : (M,) array, pose of each error, the same in all campaigns
+    before, after, false : (campaigns, M) arrays
     """
-    # Sizes that go round have the same share in any number of poses divisible by three.
+    # Each of the three sizes has the same share if the number of poses is divisible by
+    # three.
     sizes = (
         np.resize([2, 6, 10], poses)
         if kind == "uneven"
-        else np.full(poses, INTERPRETATIONS)
+        else np.full(poses, MEASUREMENTS_A_POSE)
     )
     cluster = np.repeat(np.arange(poses), sizes)
     scale = np.ones((campaigns, poses))
@@ -39,17 +49,18 @@ def made_errors(kind, campaigns, poses, rng):
         * [0.0, 0.0, 1.0]
     )
     false = noise + 0.1 * effect + 0.3 * rng.standard_normal(noise.shape)
-    return cluster, *(
-        np.linalg.norm(off, axis=-1)
-        for off in (noise + effect, noise + 0.1 * effect, false)
-    )
+    before = np.linalg.norm(noise + effect, axis=-1)
+    after = np.linalg.norm(noise + 0.1 * effect, axis=-1)
+    return cluster, before, after, np.linalg.norm(false, axis=-1)
 
 
 def true_figures(kind):
-    """What the intervals are of, from very many poses: mean and RMS after, and the two
-    reductions."""
+    """Compute the true values of the intervals from very many poses.
+
+    They are mean and RMS after the correction, and the two reductions of the RMS.
+    """
     _, before, after, false = made_errors(
-        kind, 1, _MANY - _MANY % 3, np.random.default_rng(99)
+        kind, 1, _MANY_POSES - _MANY_POSES % 3, np.random.default_rng(99)
     )
     rms = [np.sqrt((distance**2).mean()) for distance in (before, after, false)]
     figures = {"mean_m": after.mean(), "rms_m": rms[1]}
@@ -60,9 +71,15 @@ def true_figures(kind):
 
 
 def campaigns_of(kind, campaigns, poses, seed):
-    """(before, after, false) as `Errors`, campaign by campaign."""
+    """List before, after and false as `PositionErrors`, campaign by campaign."""
     cluster, *stages = made_errors(kind, campaigns, poses, np.random.default_rng(seed))
-    return [
-        tuple(PositionErrors(distance, cluster) for distance in of_one)
-        for of_one in zip(*stages, strict=True)
-    ]
+    campaign_errors = []
+    for before, after, false in zip(*stages, strict=True):
+        campaign_errors.append(
+            (
+                PositionErrors(before, cluster),
+                PositionErrors(after, cluster),
+                PositionErrors(false, cluster),
+            )
+        )
+    return campaign_errors

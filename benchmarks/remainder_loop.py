@@ -1,5 +1,6 @@
-"""The loop closed on a robot whose smooth error no catalogue has: how near the
-correction comes to chance alone.
+"""Close the loop on a robot with a smooth error that the catalogue lacks.
+
+The correction is compared with the noise floor.
 
 A simulated KUKA: joint offsets; a deviation of joint 2 or 3 by two joints' angles at
 once; a tracker of 50 µm; 20 µrad of error in each joint at each approach. It is
@@ -9,9 +10,12 @@ a row for each campaign, and fails where the RMS of all as delivered is more tha
 times what chance leaves of a robot whose error is known.
 """
 
+from __future__ import annotations
+
 import argparse
 import sys
 import time
+from dataclasses import dataclass
 
 import numpy as np
 from remainder_rates import (
@@ -32,89 +36,159 @@ from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.settings import Settings
 from elastocal.exchange.target_path import OK
-from elastocal.loop.whole import calibrated_by
+from elastocal.loop.whole import build_calibrated_robot
+from elastocal.mechanics.robot import Robot
 
 GOAL = 1.3
 
 
-def closed(poses: int, size: float, seed: int) -> dict[str, float]:
-    """RMS errors of one robot, m: uncorrected, by physics, as delivered, and by chance
-    alone."""
-    robot = read_robot(ROBOTS / "kuka.yaml")
-    draws = np.random.default_rng(seed)
-    offsets = draws.normal(0.0, OFFSET_RAD, 6)
-    two = draws.choice(5, 2, replace=False)
-    moved = draws.choice([1, 2])
-    phases = draws.uniform(0.0, 2.0 * np.pi, 2)
+@dataclass(frozen=True)
+class DeviatingRobot:
+    """A simulated KUKA with joint offsets and a deviation that no effect describes.
 
-    def off(angles: np.ndarray, chance_rad: float = JOINT_RAD) -> np.ndarray:
-        """By how much joints stand beyond what is reported, rad."""
-        found = offsets + draws.normal(0.0, chance_rad, angles.shape)
-        found[:, moved] += 2.0 * size * np.sin(angles[:, two] + phases).prod(axis=1)
-        return found
+    Attributes
+    ----------
+    robot : Robot
+    seed : int
+        Seed of the campaigns.
+    draws : numpy Generator
+        Draws errors of approach and of the tracker.
+    offsets : (6,) array, rad
+    deviating_joint : int
+    two_joints : (2,) array
+        Joints whose angles the deviation depends on.
+    phases : (2,) array, rad
+    size_rad : float
+    """
 
-    def surveyed(count: int, part: int) -> tuple[dict[str, np.ndarray], np.ndarray]:
-        plan = Plan(
-            ("6DoF",), count, 100.0, (0,), (0.0, 0.0, 0.0), 1, 0, NOISE_M, NOISE_M
+    robot: Robot
+    seed: int
+    draws: np.random.Generator
+    offsets: np.ndarray
+    deviating_joint: int
+    two_joints: np.ndarray
+    phases: np.ndarray
+    size_rad: float
+
+    @classmethod
+    def draw(cls, seed: int, size_rad: float) -> DeviatingRobot:
+        draws = np.random.default_rng(seed)
+        offsets = draws.normal(0.0, OFFSET_RAD, 6)
+        two_joints = draws.choice(5, 2, replace=False)
+        return cls(
+            read_robot(ROBOTS / "kuka.yaml"),
+            seed,
+            draws,
+            offsets,
+            deviating_joint=draws.choice([1, 2]),
+            two_joints=two_joints,
+            phases=draws.uniform(0.0, 2.0 * np.pi, 2),
+            size_rad=size_rad,
         )
-        table = draw_measurements(robot, plan, 1000 * seed + part, "loop")
+
+    def joint_errors(
+        self, angles: np.ndarray, approach_rad: float = JOINT_RAD
+    ) -> np.ndarray:
+        """Draw how far the joints are from their reported angles, rad."""
+        errors = self.offsets + self.draws.normal(0.0, approach_rad, angles.shape)
+        waves = np.sin(angles[:, self.two_joints] + self.phases)
+        errors[:, self.deviating_joint] += 2.0 * self.size_rad * waves.prod(axis=1)
+        return errors
+
+    def draw_campaign(
+        self, poses: int, number: int
+    ) -> tuple[dict[str, np.ndarray], np.ndarray]:
+        """Draw measurements of random poses, and their joint angles."""
+        plan = Plan(
+            ("6DoF",), poses, 100.0, (0,), (0.0, 0.0, 0.0), 1, 0, NOISE_M, NOISE_M
+        )
+        stream = 1000 * self.seed + number
+        table = draw_measurements(self.robot, plan, stream, "loop")
         return table, np.column_stack([table[f"q{joint}"] for joint in range(1, 7)])
 
-    table, angles = surveyed(poses + HELD_OUT, 0)
-    table |= {
-        f"q{joint}": column for joint, column in enumerate((angles - off(angles)).T, 1)
-    }
-    case, held_out = measured_cases("loop", table, poses)
-    found = diagnose(case, Settings(), seed)
-    verdict = judge(found, held_out, seed)
-    wanted = robot.reported_angles(surveyed(HELD_OUT, 1)[1])
-    position, rotation = compute_nominal_poses(robot, wanted)
+    def commands_without_error(self, wanted: np.ndarray) -> np.ndarray:
+        """Compute the joint targets of somebody who knows the errors of the joints."""
+        angles = self.robot.model_angles(wanted)
+        for _ in range(4):
+            angles = self.robot.model_angles(wanted) - self.joint_errors(angles, 0.0)
+        return self.robot.reported_angles(angles)
 
-    def missed(calibrated: CalibratedRobot, commands: np.ndarray) -> float:
-        """In the frame of the correction, of poses that are measured at some
-        commands."""
-        true = robot.model_angles(commands)
+    def measure(self, commands: np.ndarray) -> np.ndarray:
+        """Draw the measured positions (N, 3) after some joint commands."""
+        angles = self.robot.model_angles(commands)
+        true_angles = angles + self.joint_errors(angles)
         reached, _ = compute_nominal_poses(
-            robot, robot.reported_angles(true + off(true))
+            self.robot, self.robot.reported_angles(true_angles)
         )
-        field = (reached + draws.normal(0.0, NOISE_M, reached.shape) - position)[
-            ..., None
-        ]
-        left = subtract_placement(
-            calibrated.scope,
-            position,
-            rotation,
-            np.concatenate([field, 0 * field], axis=1),
-        )
-        return root_mean_square(left[:, :3, 0])
+        return reached + self.draws.normal(0.0, NOISE_M, reached.shape)
 
+
+def close_loop(poses: int, size: float, seed: int) -> dict[str, float]:
+    """Diagnose, correct and measure one robot again.
+
+    Returns
+    -------
+    dict
+        RMS errors, m: uncorrected (before), as a robot with known errors (chance), by
+        physics alone (physics), and with the regression (delivered).
+    """
+    deviating = DeviatingRobot.draw(seed, size)
+    table, angles = deviating.draw_campaign(poses + HELD_OUT, 0)
+    reported = angles - deviating.joint_errors(angles)
+    table |= {f"q{joint}": column for joint, column in enumerate(reported.T, 1)}
+    case, held_out = measured_cases("loop", table, poses)
+    diagnosis = diagnose(case, Settings(), seed)
+    judgement = judge(diagnosis, held_out, seed)
     corrected = {
-        name: calibrated_by(
-            found, verdict.held_out, verdict.delivered, physics_only=name == "physics"
+        name: build_calibrated_robot(
+            diagnosis,
+            judgement.held_out,
+            judgement.delivered,
+            physics_only=name == "physics",
         )
         for name in ("physics", "delivered")
     }
+    return measure_corrections(deviating, corrected)
+
+
+def measure_corrections(
+    deviating: DeviatingRobot, corrected: dict[str, CalibratedRobot]
+) -> dict[str, float]:
+    """Command new poses by each correction, and measure them; see `close_loop`."""
+    robot = deviating.robot
+    wanted = robot.reported_angles(deviating.draw_campaign(HELD_OUT, 1)[1])
+    position, rotation = compute_nominal_poses(robot, wanted)
     unloaded = np.zeros((len(wanted), 6))
-    targets = {
-        name: find_joint_targets(each, position, rotation, unloaded, wanted)
-        for name, each in corrected.items()
+    corrections = {
+        name: find_joint_targets(calibrated, position, rotation, unloaded, wanted)
+        for name, calibrated in corrected.items()
     }
-    good = np.all([each.status == OK for each in targets.values()], axis=0)
-    position = position[good]
-    rotation = rotation[good]
-    wanted = wanted[good]
-    known = robot.model_angles(wanted)
-    for _ in range(4):
-        known = robot.model_angles(wanted) - off(known, 0.0)
-    errors = {
-        name: missed(corrected[name], each.joint_angles[good])
-        for name, each in targets.items()
+    reached = np.all(
+        [correction.status == OK for correction in corrections.values()], axis=0
+    )
+    commands = {
+        name: correction.joint_angles[reached]
+        for name, correction in corrections.items()
     }
-    ends = {
-        name: missed(corrected["delivered"], each)
-        for name, each in (("before", wanted), ("chance", robot.reported_angles(known)))
+    commands |= {
+        "before": wanted[reached],
+        "chance": deviating.commands_without_error(wanted[reached]),
     }
-    return ends | errors
+    errors = {}
+    for name in ("physics", "delivered", "before", "chance"):
+        calibrated = corrected.get(name, corrected["delivered"])
+        error = deviating.measure(commands[name]) - position[reached]
+        field = np.concatenate([error[..., None], 0 * error[..., None]], axis=1)
+        # Errors are those in the frame of the correction.
+        placed = subtract_placement(
+            calibrated.scope, position[reached], rotation[reached], field
+        )
+        errors[name] = root_mean_square(placed[:, :3, 0])
+    return {name: errors[name] for name in ("before", "chance", "physics", "delivered")}
+
+
+def describe(errors_m: dict[str, float]) -> str:
+    return ", ".join(f"{name} {1e6 * error:.0f} µm" for name, error in errors_m.items())
 
 
 if __name__ == "__main__":
@@ -122,20 +196,16 @@ if __name__ == "__main__":
     parser.add_argument("poses", type=int)
     parser.add_argument("campaigns", type=int)
     parser.add_argument("size", type=float)
-    asked = parser.parse_args()
+    arguments = parser.parse_args()
     rows = []
-
-    def words(row: dict[str, float]) -> str:
-        return ", ".join(f"{name} {1e6 * value:.0f} µm" for name, value in row.items())
-
-    for seed in range(asked.campaigns):
+    for seed in range(arguments.campaigns):
         start = time.process_time()
-        rows.append(closed(asked.poses, asked.size, seed))
-        print(words(rows[-1]), f"{time.process_time() - start:.1f} s CPU", flush=True)
-    whole = {
-        name: float(np.sqrt(np.mean([row[name] ** 2 for row in rows])))
-        for name in rows[0]
-    }
-    ratio = whole["delivered"] / whole["chance"]
-    print("all:", words(whole), f"delivered {ratio:.2f} times chance")
+        rows.append(close_loop(arguments.poses, arguments.size, seed))
+        seconds = time.process_time() - start
+        print(describe(rows[-1]), f"{seconds:.1f} s CPU", flush=True)
+    total = {}
+    for name in rows[0]:
+        total[name] = float(np.sqrt(np.mean([row[name] ** 2 for row in rows])))
+    ratio = total["delivered"] / total["chance"]
+    print("all:", describe(total), f"delivered {ratio:.2f} times chance")
     sys.exit(ratio > GOAL)

@@ -23,7 +23,7 @@ from elastocal.campaigns.simulation import draw_measurements
 from elastocal.campaigns.writing import write_campaign
 from elastocal.fitting.model import Case
 from elastocal.fitting.noise import Noise, fit_declared_model
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import read_cases
 from elastocal.residual_model.repeatable import detect_repeatable_residual
 from elastocal.residual_model.selection import build_inputs, validate_residual_model
 from elastocal.validation.held_out import compute_position_residuals
@@ -55,7 +55,7 @@ def measured_cases(
     }
     with TemporaryDirectory() as folder:
         write_campaign(Path(folder) / name, document, table, 6, "csv")
-        return cases_in(Path(folder) / name, ROBOTS)
+        return read_cases(Path(folder) / name, ROBOTS)
 
 
 def exact_cases(poses: int) -> tuple[Case, Case]:
@@ -70,7 +70,7 @@ def exact_cases(poses: int) -> tuple[Case, Case]:
     )
 
 
-def drawn(case: Case, seed: int, part: int, size: float) -> tuple[Case, np.ndarray]:
+def drawn(case: Case, seed: int, number: int, size: float) -> tuple[Case, np.ndarray]:
     """A case with errors, and what no model could predict of it, (M, 3), m. `part`: of
     one robot, that of the seed."""
     fitted = fit_declared_model(case.model, case.observations, NOISE)
@@ -81,17 +81,18 @@ def drawn(case: Case, seed: int, part: int, size: float) -> tuple[Case, np.ndarr
     moved = robot.choice([1, 2])
     waves = np.sin(inputs.joint_angles[:, joints] + robot.uniform(0.0, 2.0 * np.pi, 2))
     deviation = 2.0 * size * waves.prod(axis=1)[:, None] * inputs.jacobian[:, :, moved]
-    draws = np.random.default_rng([seed, part])
+    draws = np.random.default_rng([seed, number])
     along = inputs.jacobian[:, :, :6]
     chance = (
         draws.normal(0.0, NOISE_M, deviation.shape)
         + (along @ draws.normal(0.0, JOINT_RAD, (len(along), 6, 1)))[..., 0]
     )
-    seen = case.observations
+    observations = case.observations
     return replace(
         case,
         observations=replace(
-            seen, position=seen.position + deviation + along @ offsets + chance
+            observations,
+            position=observations.position + deviation + along @ offsets + chance,
         ),
     ), chance
 
@@ -116,7 +117,8 @@ if __name__ == "__main__":
         errors = []
         for seed in range(asked.campaigns):
             (case, _), (held_out, chance) = (
-                drawn(each, seed, part, size) for part, each in enumerate(exact)
+                drawn(exact_case, seed, number, size)
+                for number, exact_case in enumerate(exact)
             )
             fitted = fit_declared_model(case.model, case.observations, NOISE)
             p_values.append(
@@ -127,7 +129,7 @@ if __name__ == "__main__":
             alone = compute_position_residuals(
                 *transfer_fit(fitted, case, held_out), held_out.observations
             )
-            found = validate_residual_model(
+            validated = validate_residual_model(
                 fitted,
                 case,
                 held_out,
@@ -136,22 +138,31 @@ if __name__ == "__main__":
                 within_range=True,
                 seed=seed,
             )
-            squares = [(off**2).sum(axis=1) for off in (alone, found.residual, chance)]
-            off = squares[1] - squares[0]
-            used += found.predictor is not None
-            worse += off.mean() > off.std(ddof=1) / np.sqrt(len(off)) > 0.0
-            errors.append([each.mean() for each in squares])
+            squares = [
+                (residual**2).sum(axis=1)
+                for residual in (alone, validated.residual, chance)
+            ]
+            change = squares[1] - squares[0]
+            used += validated.predictor is not None
+            worse += change.mean() > change.std(ddof=1) / np.sqrt(len(change)) > 0.0
+            errors.append([squared_errors.mean() for squared_errors in squares])
         rates = ", ".join(
             f"p <= {level}: {np.mean(np.array(p_values) <= level):.3f}"
             for level in LEVELS
         )
-        row = f"{asked.poses} poses, {1e3 * size:g} mrad, {asked.campaigns} campaigns; something remains, {rates}"
+        row = (
+            f"{asked.poses} poses, {1e3 * size:g} mrad, {asked.campaigns} campaigns;"
+            f" something remains, {rates}"
+        )
         if errors:
             physics, with_it, floor = (
                 rms(column) for column in zip(*errors, strict=True)
             )
-            row += f"; used {used}, worse by more than a standard error {worse}; held-out RMS of physics {physics:.0f} µm, "
-            row += f"with the regression {with_it:.0f}, of chance alone {floor:.0f}"
+            row += (
+                f"; used {used}, worse by more than a standard error {worse};"
+                f" held-out RMS of physics {physics:.0f} µm,"
+                f" with the regression {with_it:.0f}, of chance alone {floor:.0f}"
+            )
         print(
             f"{row}; {(time.process_time() - start) / asked.campaigns:.2f} s CPU each",
             flush=True,

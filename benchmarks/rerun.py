@@ -27,7 +27,10 @@ def rows(work: Path, setting: Setting) -> list[Row]:
 
     functions = {"rerun": again, "--version": lambda: snakemake(folder, "--version")}
     ours, theirs = map(min, interleaved(functions, setting.repetitions))
-    how = f"snakemake {' '.join(setting.jobs)} with everything made, against snakemake --version, least of {setting.repetitions}"
+    how = (
+        f"snakemake {' '.join(setting.jobs)} with everything made,"
+        f" against snakemake --version, minimum of {setting.repetitions}"
+    )
     return [
         Row(
             "rerun",

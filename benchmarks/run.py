@@ -54,8 +54,10 @@ def main() -> None:
                     replace(row, target="", holds=None) if given.small else row
                 )
                 table[row.benchmark] = line
+                target = line["target"] or "none"
                 print(
-                    f"  {row.benchmark}: ratio {line['ratio']}, target {line['target'] or 'none'} {line['holds']}",
+                    f"  {row.benchmark}: ratio {line['ratio']},"
+                    f" target {target} {line['holds']}",
                     flush=True,
                 )
             _write(table.values(), report)

@@ -1,5 +1,7 @@
-"""10,000 data sets against 1,000: seconds and peak memory of each step for one robot,
-strategy and noise level."""
+"""Compare seconds and peak memory of 10,000 data sets with those of 1,000.
+
+Each step is measured for one robot, strategy and noise level.
+"""
 
 import csv
 from collections.abc import Sequence
@@ -12,7 +14,7 @@ from copies import copy_study, snakemake
 CELL = "kuka/200um"
 TIMED = "kuka/200"
 STRATEGY = "3+6DoF-comb"
-# What a job makes, and where Snakemake notes its seconds.
+# The file that a job makes, and the file of its seconds, by step.
 STEPS = {
     "draw_experiments": ("data/simulated/kuka/experiments.parquet", "kuka"),
     "simulate": ("data/simulated/kuka/ideal.parquet", "kuka"),
@@ -26,8 +28,8 @@ STEPS = {
 TIME_TARGET = 11
 MEMORY_TARGET = 1.15
 MEMORY_LIMIT_GB = 1.5
-# Snakemake samples memory twice a second and misses peaks: each job notes its own when
-# it ends (Linux).
+# Snakemake samples memory twice a second and misses peaks, so each job writes its own peak
+# when it ends (Linux).
 NOTE_PEAK = """
 
 def run(step, job, *checked, run=run):
@@ -40,29 +42,34 @@ def run(step, job, *checked, run=run):
 
 @dataclass(frozen=True)
 class Setting:
-    """Numbers of data sets, and repetitions."""
+    """Two numbers of data sets, and the number of repetitions."""
 
     data_sets: tuple[int, int]
     repetitions: int
 
 
-# The small one runs once for both sizes.
+@dataclass(frozen=True)
+class Usage:
+    """Seconds and peak memory of one job."""
+
+    seconds: float
+    peak_gb: float
+
+
+# The small setting runs once for both sizes.
 FULL = Setting((1000, 10_000), 2)
 SMALL = Setting((10, 10), 1)
 
 
 def rows(work: Path, setting: Setting) -> list[Row]:
-    """Rows of the report, for time and for memory.
-
-    `work`: temporary folder.
-    """
+    """Measure the rows for time and for memory in a temporary folder."""
     sizes = setting.data_sets
     repetitions = setting.repetitions
     folders = {
         size: _copy_that_notes_peaks(work / f"scale-{size}")
         for size in dict.fromkeys(sizes)
     }
-    runs: dict[int, list[dict[str, tuple[float, float]]]] = {size: [] for size in sizes}
+    runs: dict[int, list[dict[str, Usage]]] = {size: [] for size in sizes}
     for repetition in range(1, repetitions + 1):
         for size, folder in folders.items():
             snakemake(
@@ -73,44 +80,55 @@ def rows(work: Path, setting: Setting) -> list[Row]:
                 f"data_sets={size}",
                 "--forceall",
             )
-            runs[size].append({step: _seconds_and_peak(folder, step) for step in STEPS})
+            usage = {step: _read_usage(folder, step) for step in STEPS}
+            runs[size].append(usage)
+            seconds = sum(step_usage.seconds for step_usage in usage.values())
             print(
-                f"  {repetition}/{repetitions}: {size} data sets {sum(s for s, _ in runs[size][-1].values()):.1f} s",
+                f"  {repetition}/{repetitions}: {size} data sets {seconds:.1f} s",
                 flush=True,
             )
-    (small_s, small_gb), (large_s, large_gb) = (_smallest(runs[size]) for size in sizes)
+    small, large = (_smallest_usage(runs[size]) for size in sizes)
     for step in STEPS:
-        growth = f"{small_s[step]:.1f} to {large_s[step]:.1f} s, {small_gb[step]:.3f} to {large_gb[step]:.3f} GB"
-        print(f"  {step}: {growth}", flush=True)
-    theirs = sum(small_s.values())
-    ours = sum(large_s.values())
-    worst = max(STEPS, key=lambda step: large_gb[step] / small_gb[step])
-    growth = large_gb[worst] / small_gb[worst]
-    peak = max(large_gb.values())
-    against = f"{sizes[1]} against {sizes[0]} data sets, {STRATEGY} on kuka at 200 µm, minimum of {repetitions}"
-    time = f"sum of the seconds of {', '.join(STEPS)}: {against}"
-    memory = f"peak memory of the job that grows most, {worst}; largest of any job {peak:.2f} GB: {against}"
-    within = growth <= MEMORY_TARGET and peak < MEMORY_LIMIT_GB
-    return [
-        Row(
-            "scale time",
-            ours,
-            theirs,
-            ours / theirs,
-            f"<= {TIME_TARGET}",
-            ours / theirs <= TIME_TARGET,
-            time,
-        ),
-        Row(
-            "scale memory",
-            None,
-            None,
-            growth,
-            f"<= {MEMORY_TARGET}, below {MEMORY_LIMIT_GB} GB",
-            within,
-            memory,
-        ),
-    ]
+        print(
+            f"  {step}: {small[step].seconds:.1f} to {large[step].seconds:.1f} s,"
+            f" {small[step].peak_gb:.3f} to {large[step].peak_gb:.3f} GB",
+            flush=True,
+        )
+    compared = (
+        f"{sizes[1]} against {sizes[0]} data sets,"
+        f" {STRATEGY} on kuka at 200 µm, minimum of {repetitions}"
+    )
+    return [_time_row(small, large, compared), _memory_row(small, large, compared)]
+
+
+def _time_row(small: dict[str, Usage], large: dict[str, Usage], compared: str) -> Row:
+    ours = sum(usage.seconds for usage in large.values())
+    theirs = sum(usage.seconds for usage in small.values())
+    return Row(
+        "scale time",
+        ours,
+        theirs,
+        ours / theirs,
+        f"<= {TIME_TARGET}",
+        ours / theirs <= TIME_TARGET,
+        f"sum of the seconds of {', '.join(STEPS)}: {compared}",
+    )
+
+
+def _memory_row(small: dict[str, Usage], large: dict[str, Usage], compared: str) -> Row:
+    growth = {step: large[step].peak_gb / small[step].peak_gb for step in STEPS}
+    worst = max(growth, key=growth.__getitem__)
+    peak_gb = max(usage.peak_gb for usage in large.values())
+    return Row(
+        "scale memory",
+        None,
+        None,
+        growth[worst],
+        f"<= {MEMORY_TARGET}, below {MEMORY_LIMIT_GB} GB",
+        growth[worst] <= MEMORY_TARGET and peak_gb < MEMORY_LIMIT_GB,
+        f"peak memory of the job that grows most, {worst};"
+        f" largest of any job {peak_gb:.2f} GB: {compared}",
+    )
 
 
 def _copy_that_notes_peaks(folder: Path) -> Path:
@@ -120,22 +138,22 @@ def _copy_that_notes_peaks(folder: Path) -> Path:
     return folder
 
 
-def _seconds_and_peak(folder: Path, step: str) -> tuple[float, float]:
+def _read_usage(folder: Path, step: str) -> Usage:
     made, timing = STEPS[step]
-    with open(
-        folder / "results" / "timings" / step / f"{timing}.tsv", encoding="utf-8"
-    ) as file:
+    timings = folder / "results" / "timings" / step / f"{timing}.tsv"
+    with open(timings, encoding="utf-8") as file:
         seconds = float(next(csv.DictReader(file, delimiter="\t"))["s"])
-    return seconds, int(
-        (folder / f"{made}.peak_kB").read_text(encoding="utf-8")
-    ) * 1024 / 1e9
+    peak_kb = int((folder / f"{made}.peak_kB").read_text(encoding="utf-8"))
+    return Usage(seconds, peak_kb * 1024 / 1e9)
 
 
-def _smallest(
-    runs: Sequence[dict[str, tuple[float, float]]],
-) -> tuple[dict[str, float], ...]:
-    """Seconds and GB of each step, the smallest of its runs."""
-    return tuple(
-        {step: min(run[step][part] for run in runs) for step in STEPS}
-        for part in (0, 1)
-    )
+def _smallest_usage(runs: Sequence[dict[str, Usage]]) -> dict[str, Usage]:
+    """Return the smallest seconds and the smallest peak of each step over all runs."""
+    smallest = {}
+    for step in STEPS:
+        usages = [run[step] for run in runs]
+        smallest[step] = Usage(
+            min(usage.seconds for usage in usages),
+            min(usage.peak_gb for usage in usages),
+        )
+    return smallest

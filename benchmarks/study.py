@@ -46,7 +46,8 @@ sys.path[:0] = ["src", "workflow/scripts"]
 for record in sorted(Path("jobs").iterdir()):
     snakemake = pickle.loads(record.read_bytes())
     source = Path("workflow", "scripts", record.name.partition("-")[2])
-    exec(compile(source.read_text(encoding="utf-8"), source, "exec"), {"snakemake": snakemake, "__name__": "__main__"})
+    code = compile(source.read_text(encoding="utf-8"), source, "exec")
+    exec(code, {"snakemake": snakemake, "__name__": "__main__"})
 """
 
 
@@ -67,7 +68,10 @@ def rows(work: Path, setting: Setting) -> list[Row]:
         raise AssertionError(
             f"one of the two did not make {', '.join(sorted(missing))}"
         )
-    how = f"snakemake {' '.join(setting.jobs)} on a clean copy against the same scripts one after the other in one process, CPU"
+    how = (
+        f"snakemake {' '.join(setting.jobs)} on a clean copy against the same scripts"
+        " one after the other in one process, CPU"
+    )
     return [
         Row(
             "study",
@@ -107,8 +111,8 @@ def _made(folder: Path) -> set[str]:
     """Files that jobs made, without what is noted on each job beside them."""
     files = (
         path.relative_to(folder)
-        for part in ("data", "results", "reports")
-        for path in (folder / part).rglob("*.*")
+        for top in ("data", "results", "reports")
+        for path in (folder / top).rglob("*.*")
     )
     return {
         path.as_posix()

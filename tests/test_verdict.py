@@ -11,8 +11,8 @@ from elastocal.errors import InputError
 from elastocal.io.json_files import read_json, write_json
 from elastocal.verdict import (
     NextExperiment,
+    build_verdict_schema,
     read_verdict,
-    verdict_schema,
     write_verdict,
 )
 
@@ -23,7 +23,7 @@ def test_a_verdict_survives_its_file_and_fits_the_schema(kind, tmp_path):
     write_verdict(path, CAMPAIGNS[kind])
     assert read_verdict(path) == CAMPAIGNS[kind]
     document = json.loads(path.read_text(encoding="utf-8"))
-    jsonschema.validate(document, verdict_schema())
+    jsonschema.validate(document, build_verdict_schema())
     assert "next_experiment" not in document
 
 

@@ -9,7 +9,6 @@ that Sphinx reads again only what did.
 from __future__ import annotations
 
 import re
-import shutil
 import sys
 from pathlib import Path
 
@@ -39,12 +38,12 @@ LINK = re.compile(r"\]\(([^)#\s]+)")
 
 def repository_pages() -> list[Path]:
     """Every page of the repository, relative to its top."""
-    found = {
+    files = {
         path.relative_to(REPOSITORY)
         for pattern in PAGES
         for path in REPOSITORY.glob(pattern)
     }
-    return sorted(path for path in found if path.as_posix() not in NO_PAGES)
+    return sorted(path for path in files if path.as_posix() not in NO_PAGES)
 
 
 def linked_files(page: Path) -> set[Path]:
@@ -74,37 +73,28 @@ def made_pages() -> dict[str, str]:
 
 
 def assemble(folder: Path) -> None:
-    """Make the source of the site in a folder; a page that did not change keeps its
-    date."""
+    """Make the source of the site in a folder; an unchanged page keeps its date."""
     pages = repository_pages()
-    files = {
-        Path("docs/site/index.md"): Path("index.md"),
-        **{page: page for page in pages},
-    }
+    files = {Path("docs/site/index.md"): Path("index.md")}
+    files |= {page: page for page in pages}
     files |= {file: file for page in pages for file in linked_files(page)}
     files |= {
         path.relative_to(REPOSITORY): Path("signatures") / path.name
         for path in sorted(SIGNATURES.glob("*.svg"))
     }
-    texts = made_pages()
-    wanted = {folder / place for place in (*files.values(), *map(Path, texts))}
-    for old in [
-        path for path in folder.rglob("*") if not path.is_dir() and path not in wanted
-    ]:
-        old.unlink()
-    for file, place in files.items():
-        target = folder / place
-        target.parent.mkdir(parents=True, exist_ok=True)
-        if (
-            not target.exists()
-            or target.read_bytes() != (REPOSITORY / file).read_bytes()
-        ):
-            shutil.copyfile(REPOSITORY / file, target)
-    for name, text in texts.items():
-        target = folder / name
-        target.parent.mkdir(parents=True, exist_ok=True)
-        if not target.is_file() or target.read_text(encoding="utf-8") != text:
-            target.write_text(text, encoding="utf-8")
+    contents = {
+        folder / name: (REPOSITORY / file).read_bytes() for file, name in files.items()
+    }
+    contents |= {
+        folder / name: text.encode("utf-8") for name, text in made_pages().items()
+    }
+    for path in folder.rglob("*"):
+        if path.is_file() and path not in contents:
+            path.unlink()
+    for path, content in contents.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if not path.exists() or path.read_bytes() != content:
+            path.write_bytes(content)
 
 
 if __name__ == "__main__":

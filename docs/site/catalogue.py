@@ -1,5 +1,7 @@
-"""The page of the catalogue of effects: physics and formula of each from its docstring,
-its figure and its parameters."""
+"""Make the page of the catalogue of effects.
+
+Each effect has its physics and formula, from its docstring, its figure and parameters.
+"""
 
 from __future__ import annotations
 
@@ -20,24 +22,29 @@ if TYPE_CHECKING:
 HEAD = """The catalogue of effects
 ========================
 
-What a calibrated model may lack, one physical effect each. Made of the functions of ``elastocal.effects``: what it says is what
-the code computes. A diagnosis compares all of them, at every location where they can act on the robot.
+The physical effects that a calibrated model may lack. This page is made from the
+functions of ``elastocal.effects``, so it states what the code computes. A diagnosis
+compares all effects, at every location where they can act on the robot.
 
 How to read the figures
 -----------------------
 
-Each effect acts on the same heavy arm (Yaskawa GP180, gears of 100:1), with all its parameters at the *plausible size* that the
-table states: a size that such an effect reaches on real robots. Shown is by how much a reflector at the flange is displaced, in
+Each effect acts on the same heavy arm (Yaskawa GP180, gears of 100:1), with all its
+parameters at the *plausible size* of the table: a size that such an effect reaches on
+real robots. The figure shows the displacement of a reflector at the flange, in
 millimetres along the axes of the base; all three panels have the same scale.
 
-- **Left**: one joint turns through its range, without a load (solid) and under an oblique pull of 1 kN (dashed).
-- **Middle**: the pull rises from -1 to 1 kN in one pose; where a joint comes from below (solid) or from above (dotted).
-- **Right**: four hours in one pose without a load, while the arm warms up by 10 K. Something that happens at one moment
-  happens in the middle.
+- **Left**: one joint moves through its range, without a load (solid) and under an
+  oblique force of 1 kN (dashed).
+- **Middle**: the force rises from -1 to 1 kN in one pose; the joint approaches it from
+  below (solid) or from above (dotted).
+- **Right**: four hours in one pose without a load, while the arm warms up by 10 K. An
+  event at one moment happens in the middle.
 
-What is flat in one panel and not in another is what distinguishes effects: an offset of a joint needs neither load nor time,
-a spring does nothing without a load, a drift nothing at the beginning. Effects with alike figures are ambiguous, and a verdict
-says so.
+Effects are distinguishable if one panel is flat for one and not for the other: a joint
+offset needs neither load nor time, an elastic joint does nothing without a load, a
+drift does nothing at the beginning. Effects with similar figures are ambiguous, and a
+verdict says so.
 
 """
 FAMILIES = {
@@ -46,10 +53,10 @@ FAMILIES = {
     "transmission": "Transmission: present without a load, by the angle of the joint",
     "elastic": "Elastic: in proportion to the load",
     "gearbox": "Gearboxes: by the load or the approach, but not in proportion",
-    "load": "Loads: what the force sensor shows is not what acts",
+    "load": "Loads: the force sensor and the acting force differ",
     "drift": "Drift: by time, temperature or the order of measurements",
 }
-# That of the figures, see workflow/rules/signatures.smk.
+# Robot of the figures, see workflow/rules/signatures.smk.
 ROBOT = read_robot(
     Path(__file__).resolve().parents[2] / "config" / "robots" / "gp180.yaml"
 )
@@ -60,29 +67,28 @@ NEEDS = {
     "approach": "the sense of approach of each joint",
     "time": "the time of each measurement",
     "temperature": "the temperature",
-    "declared base": "a base whose place is declared (``frame: base``)",
+    "declared base": "a base whose placement is declared (``frame: base``)",
 }
 
 
 def page() -> str:
-    """The page, in reStructuredText as the docstrings are."""
-    listed = list_bundled_effects()
-    parts = [HEAD, _thumbnails(listed)]
-    families = dict.fromkeys([*FAMILIES, *(e.family for e in listed.values())])
-    for family in families:
-        parts.append(_headed(FAMILIES.get(family, family.capitalize()), "-"))
-        parts += [
-            _section(effect) for effect in listed.values() if family == effect.family
+    """Write the page in reStructuredText, the markup of the docstrings."""
+    effects = list_bundled_effects()
+    sections = [HEAD, _thumbnails(effects)]
+    families = [effect.family for effect in effects.values()]
+    for family in dict.fromkeys([*FAMILIES, *families]):
+        sections.append(_headed(FAMILIES.get(family, family.capitalize()), "-"))
+        sections += [
+            _section(effect) for effect in effects.values() if family == effect.family
         ]
-    return "".join(parts)
+    return "".join(sections)
 
 
-def _thumbnails(listed: Mapping[str, Effect]) -> str:
-    """A grid of the effects' figures, each with a line below it that leads to its
-    section."""
+def _thumbnails(effects: Mapping[str, Effect]) -> str:
+    """Write a grid of the figures; a line below each leads to its section."""
     figures = []
-    for name, effect in listed.items():
-        # Sphinx makes such an anchor of the label of an effect.
+    for name, effect in effects.items():
+        # Sphinx makes this anchor from the label of an effect.
         options = f"   :alt: {effect.words}\n   :target: #{name.replace('_', '-')}\n"
         figures.append(
             f".. figure:: /signatures/{name}.svg\n{options}\n   {effect.words}\n\n"
@@ -99,18 +105,22 @@ def _section(effect: Effect) -> str:
     title = f"{effect.words[0].upper()}{effect.words[1:]} (``{effect.name}``)"
     text = with_plain_references(effect.doc)
     moves = (
-        "Moves the robot, so that tasks feel it."
+        "It moves the robot, so it affects tasks."
         if effect.moves_robot
-        else "In the measurements alone: tasks do not feel it."
+        else "It affects the measurements alone, and no task."
     )
-    picture = f".. image:: /signatures/{effect.name}.svg\n   :alt: What {effect.words} does to a measured point\n\n"
-    summary, _, rest = text.strip().partition("\n\n")
+    picture = (
+        f".. image:: /signatures/{effect.name}.svg\n"
+        f"   :alt: Displacement of a measured point by {effect.words}\n\n"
+    )
+    summary, _, body = text.strip().partition("\n\n")
     # A heading of a docstring would be a heading of the page.
-    rest, _, references = rest.partition("References\n----------\n")
+    body, _, references = body.partition("References\n----------\n")
     formula = f".. math:: {effect.formula}\n\n"
     head = f".. _{effect.name}:\n\n{_headed(title, '~')}"
-    parts = (summary, formula + rest, moves, picture + _table(effect), references)
-    return head + "\n\n".join(part.strip() for part in parts) + "\n\n"
+    paragraphs = (summary, formula + body, moves, picture + _table(effect), references)
+    text = "\n\n".join(paragraph.strip() for paragraph in paragraphs)
+    return f"{head}{text}\n\n"
 
 
 def _table(effect: Effect) -> str:
@@ -127,24 +137,28 @@ def _table(effect: Effect) -> str:
         )
         for parameter in candidate.parameters
     ]
-    lines = [
-        f"Where it can act on the arm shown: {count} candidates; shown is ``{candidate.key}``."
+    sentences = [
+        f"It can act at {count} locations of this arm;"
+        f" the figure shows ``{candidate.key}``."
     ]
-    # A load on the joints is a load.
-    if needs := sorted(
-        candidate.needs
-        - ({"load"} if "load on the joints" in candidate.needs else set())
-    ):
-        lines.append(
-            f"It can be found only with {' and '.join(NEEDS[need] for need in needs)}."
-        )
+    needs = set(candidate.needs)
+    if "load on the joints" in needs:
+        # It implies a load.
+        needs.discard("load")
+    if needs:
+        conditions = " and ".join(NEEDS[need] for need in sorted(needs))
+        sentences.append(f"It can be found only with {conditions}.")
     for shape in candidate.shapes:
         unit = "" if shape.unit == "1" else f" {shape.unit}"
-        lines.append(
-            f"Not linear in ``{shape.name}``, between {shape.lowest:.3g} and {shape.highest:.3g}{unit}."
+        sentences.append(
+            f"It is nonlinear in ``{shape.name}``,"
+            f" between {shape.lowest:.3g} and {shape.highest:.3g}{unit}."
         )
-    head = ".. list-table::\n   :header-rows: 1\n\n   * - parameter\n     - unit\n     - plausible size\n     - sign\n"
-    return f"{' '.join(lines)}\n\n{head}{''.join(rows)}"
+    head = (
+        ".. list-table::\n   :header-rows: 1\n\n"
+        "   * - parameter\n     - unit\n     - plausible size\n     - sign\n"
+    )
+    return f"{' '.join(sentences)}\n\n{head}{''.join(rows)}"
 
 
 def _sign(sign: int) -> str:

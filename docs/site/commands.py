@@ -16,13 +16,14 @@ from elastocal.command.main import app
 _EXAMPLE = re.compile(r"^\x08\n(Examples?):\n((?:  .+\n)+)", re.MULTILINE)
 HEAD = """# Commands
 
-Made of the code; `elastocal COMMAND --help` says the same. What they do, one by one: [the commands](../docs/afternoon.md).
+Made from the code; `elastocal COMMAND --help` prints the same. [The commands, one by
+one](../docs/afternoon.md) explains them.
 
 """
 
 
 def page() -> str:
-    """Every command with its arguments and options, in Markdown, as typer writes it.
+    """Write every command with its arguments and options, in Markdown, as typer writes it.
 
     A process of its own: what the terminal is must not change the page.
     """

@@ -45,8 +45,8 @@ def with_plain_references(text: str) -> str:
     plain = re.sub(r"\[(\d+)\]_", r"[\1]", listed)
     # Determinants and absolute values are no substitutions.
     return "`".join(
-        part if code % 2 else part.replace("|", r"\|")
-        for code, part in enumerate(plain.split("`"))
+        span if code % 2 else span.replace("|", r"\|")
+        for code, span in enumerate(plain.split("`"))
     )
 
 
@@ -76,10 +76,10 @@ def _mend(
     context: dict[str, Any],
     doctree: object,
 ) -> None:
-    for part in ("body", "furo_navigation_tree", "toctree"):
-        if isinstance(context.get(part), str):
+    for key in ("body", "furo_navigation_tree", "toctree"):
+        if isinstance(context.get(key), str):
             for wrong, right in _MENDED:
-                context[part] = context[part].replace(wrong, right)
+                context[key] = context[key].replace(wrong, right)
     if isinstance(context.get("body"), str):
         context["body"] = _FIGURE.sub(
             lambda f: f[0] if f[1] else f'<a href="{f[2]}">{f[0]}</a>', context["body"]
@@ -89,9 +89,9 @@ def _mend(
 def _name_landmarks(app: Sphinx, exception: Exception | None) -> None:
     for page in Path(app.outdir).rglob("*.html") if exception is None else ():
         text = page.read_text(encoding="utf-8")
-        for part, name in _NAMED.items():
+        for tag, name in _NAMED.items():
             text = text.replace(
-                f'<aside class="{part}">', f'<aside class="{part}" aria-label="{name}">'
+                f'<aside class="{tag}">', f'<aside class="{tag}" aria-label="{name}">'
             )
         page.write_text(text, encoding="utf-8")
 

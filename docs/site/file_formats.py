@@ -43,8 +43,9 @@ _PRINTABLE = re.compile(r"Must match pattern: `[^`]*\\x00[^`]*`")
 
 HEAD = """# File formats
 
-Made of the schemas by which files are checked when they are read and written. Measurements, `measurements.csv`, are in
-[a campaign](../../docs/campaign.md), tables for an audit in [the audit](../../docs/audit.md).
+Made from the schemas that check files when they are read and written. [A
+campaign](../../docs/campaign.md) describes `measurements.csv`, [the
+audit](../../docs/audit.md) the tables for an audit.
 
 ```{toctree}
 :maxdepth: 1
@@ -54,14 +55,15 @@ Made of the schemas by which files are checked when they are read and written. M
 
 def pages() -> dict[str, str]:
     """Text of each page by its name."""
-    found = {
-        f"{name}.md": _document(name, words) for name, words in DOCUMENTS.items()
+    documents = {
+        f"{name}.md": _document(name, description)
+        for name, description in DOCUMENTS.items()
     } | {"tables.md": _tables()}
     return {
         "index.md": HEAD
-        + "".join(f"{name.removesuffix('.md')}\n" for name in found)
+        + "".join(f"{name.removesuffix('.md')}\n" for name in documents)
         + "```\n",
-        **found,
+        **documents,
     }
 
 
@@ -94,13 +96,15 @@ def _plain_example(match: re.Match[str]) -> str:
 
 
 def _tables() -> str:
-    parts = [
-        f"# Tables\n\nParquet files, column by column; those that go with the robot are shown for {JOINTS} joints.\n"
+    sections = [
+        "# Tables\n\nParquet files, column by column;"
+        f" columns of joints are shown for {JOINTS} joints.\n"
     ]
-    for module, words in TABLES.items():
-        parts.append(f"\n## {words.partition(':')[0]}\n\n{words.partition(': ')[2]}\n")
-        parts += [_table(schema) for schema in table_schemas(module)]
-    return "".join(parts)
+    for module, description in TABLES.items():
+        title, _, text = description.partition(": ")
+        sections.append(f"\n## {title}\n\n{text}\n")
+        sections += [_table(schema) for schema in table_schemas(module)]
+    return "".join(sections)
 
 
 def table_schemas(module: str) -> list[TableSchema]:
@@ -109,17 +113,18 @@ def table_schemas(module: str) -> list[TableSchema]:
     package = import_module(module)
     if hasattr(package, "__path__"):
         names = sorted(
-            each.name for each in iter_modules(package.__path__, f"{module}.")
+            module_info.name
+            for module_info in iter_modules(package.__path__, f"{module}.")
         )
         return [
             *{
                 schema.name: schema for name in names for schema in table_schemas(name)
             }.values()
         ]
-    found = []
+    schemas = []
     for name, thing in vars(package).items():
         if isinstance(thing, TableSchema):
-            found.append(thing)
+            schemas.append(thing)
         elif (
             isfunction(thing)
             and thing.__module__ == module
@@ -130,13 +135,20 @@ def table_schemas(module: str) -> list[TableSchema]:
                 thing.__annotations__.get("return"),
             )
             if made_of in ((["joints"], TableSchema), (["joints"], "TableSchema")):
-                found.append(thing(JOINTS))
-    return found
+                schemas.append(thing(JOINTS))
+    return schemas
 
 
 def _table(schema: TableSchema) -> str:
-    rows = [
-        f"| `{column.name}` | {column.type} | {column.unit or '–'} | {column.meaning} | {'yes' if column.missing else ''} |\n"
-        for column in schema.columns
+    lines = [
+        f"\n### {schema.name}\n",
+        "| column | type | unit | meaning | may be missing |",
+        "|---|---|---|---|---|",
     ]
-    return f"\n### {schema.name}\n\n| column | type | unit | meaning | may be missing |\n|---|---|---|---|---|\n{''.join(rows)}"
+    for column in schema.columns:
+        unit = column.unit or "–"
+        missing = "yes" if column.missing else ""
+        lines.append(
+            f"| `{column.name}` | {column.type} | {unit} | {column.meaning} | {missing} |"
+        )
+    return "\n".join(lines) + "\n"

@@ -8,18 +8,23 @@ from importlib import import_module
 HEAD = """Programming interface
 =====================
 
-What people import from ``elastocal``, made of the docstrings. None of it needs Snakemake or a configuration file. All else
-is internal and may change; its docstrings are in the source.
+The public functions and classes of ``elastocal``, from their docstrings. None of them
+needs Snakemake or a configuration file. Everything else is internal and may change; its
+docstrings are in the source.
 
 """
 # Modules, each with the names that are shown.
 INTERFACE = {
     "Read a robot and a campaign": {
-        "elastocal.campaigns.reading": ("read_robot", "read_campaign")
+        "elastocal.campaigns.reading": ("read_robot", "read_campaign"),
+        "elastocal.campaigns.campaign_folder": ("read_campaign_folder",),
     },
     "Move a robot": {
-        "elastocal.mechanics.kinematics": ("poses", "poses_and_jacobians"),
-        "elastocal.mechanics.elastostatics": ("generalized_forces",),
+        "elastocal.mechanics.kinematics": (
+            "compute_poses",
+            "compute_poses_and_jacobians",
+        ),
+        "elastocal.mechanics.elastostatics": ("compute_generalized_forces",),
     },
     "Simulate a campaign": {
         "elastocal.campaigns.simulation": ("Plan", "draw_measurements")
@@ -33,8 +38,9 @@ INTERFACE = {
     },
     "Diagnose": {
         "elastocal.diagnosis.diagnose": ("diagnose",),
+        "elastocal.verdict": ("Verdict", "read_verdict"),
         "elastocal.effects.protocol": ("Candidate", "Parameter"),
-        "elastocal.effects.catalogue": ("effects",),
+        "elastocal.effects.catalogue": ("list_effects",),
     },
     "Use a calibrated robot": {
         "elastocal.application.calibrated": (
@@ -47,7 +53,10 @@ INTERFACE = {
         "elastocal.application.path_correction": ("correct_path",),
     },
     "Judge predictions": {
-        "elastocal.validation.held_out": ("position_errors", "intervals")
+        "elastocal.validation.held_out": (
+            "compute_position_errors",
+            "compute_error_intervals",
+        )
     },
     "Identify compliances as in the study": {
         "elastocal.study.equation_11": (
@@ -59,16 +68,13 @@ INTERFACE = {
 
 
 def page() -> str:
-    """The page, in reStructuredText as the docstrings are."""
-    parts = [HEAD]
+    """Write the page in reStructuredText, the markup of the docstrings."""
+    blocks = [HEAD]
     for title, modules in INTERFACE.items():
-        parts.append(f"{title}\n{'-' * len(title)}\n\n")
+        blocks.append(f"{title}\n{'-' * len(title)}\n\n")
         for module, names in modules.items():
             for name in names:
-                kind = (
-                    "autoclass"
-                    if isinstance(getattr(import_module(module), name), type)
-                    else "autofunction"
-                )
-                parts.append(f".. {kind}:: {module}.{name}\n\n")
-    return "".join(parts)
+                is_class = isinstance(getattr(import_module(module), name), type)
+                directive = "autoclass" if is_class else "autofunction"
+                blocks.append(f".. {directive}:: {module}.{name}\n\n")
+    return "".join(blocks)

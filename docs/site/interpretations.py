@@ -1,5 +1,7 @@
-"""The page of what the paper leaves open: the table of the report, and the switches of
-the configuration."""
+"""Make the page of interpretations of the paper.
+
+It has the table of the report, and the switches of the configuration.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +15,9 @@ TABLE = Path(__file__).resolve().parents[2] / "config" / "paper" / "interpretati
 
 HEAD = """# Interpretations of the paper
 
-The paper leaves some points open. How each is interpreted, as in the table of the report, and by which key of
-`interpretations` in `config.yaml` another interpretation is chosen. Where there is no switch another one is not possible,
-or both are given.
+The paper leaves some points open. The table lists the interpretation of each, and the key
+of `interpretations` in `config.yaml` that chooses another one. Points without a switch
+have no other possible interpretation, or both are given.
 
 | point | open | interpretation | switch |
 |---|---|---|---|
@@ -23,34 +25,30 @@ or both are given.
 
 
 def page() -> str:
-    """The page, in Markdown."""
-    text = (
-        resources.files("elastocal.schemas")
-        .joinpath("config.yaml")
-        .read_text(encoding="utf-8")
-    )
-    switches = yaml.safe_load(text)["properties"]["interpretations"]["properties"]
+    """Write the page in Markdown."""
+    schema = resources.files("elastocal.schemas").joinpath("config.yaml")
+    document = yaml.safe_load(schema.read_text(encoding="utf-8"))
+    switches = document["properties"]["interpretations"]["properties"]
     with open(TABLE, encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    return HEAD + "".join(
-        f"| {row['number']} | {row['open']} | {row['interpretation']} | {_switch(row['number'], switches)} |\n"
-        for row in rows
-    )
+    lines = []
+    for row in rows:
+        switch = _switch(row["number"], switches)
+        lines.append(
+            f"| {row['number']} | {row['open']} | {row['interpretation']} | {switch} |\n"
+        )
+    return HEAD + "".join(lines)
 
 
 def _switch(number: str, switches: dict[str, dict]) -> str:
-    """Keys whose description begins with the number, with what they allow."""
-    found = {
-        key: words
-        for key, words in switches.items()
-        if words["description"].startswith(f"{number}:")
-    }
-    return "; ".join(
-        f"`{key}`: "
-        + (
-            ", ".join(f"`{value}`" for value in words["enum"])
-            if "enum" in words
-            else words["description"][4:]
-        )
-        for key, words in found.items()
-    )
+    """List the keys whose description begins with a number, with their values."""
+    entries = []
+    for key, schema in switches.items():
+        if not schema["description"].startswith(f"{number}:"):
+            continue
+        if "enum" in schema:
+            values = ", ".join(f"`{value}`" for value in schema["enum"])
+        else:
+            values = schema["description"][4:]
+        entries.append(f"`{key}`: {values}")
+    return "; ".join(entries)

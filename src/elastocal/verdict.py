@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.typed_json import (
     OMITTED_BY_DEFAULT,
+    build_json_schema,
     from_document,
-    json_schema,
     to_document,
 )
 
@@ -753,6 +753,6 @@ def write_verdict(path: str | Path, verdict: Verdict) -> None:
     write_json(path, to_document(verdict), allow_nan=False)
 
 
-def verdict_schema() -> Mapping[str, Any]:
+def build_verdict_schema() -> Mapping[str, Any]:
     """Return the JSON schema of verdict.json."""
-    return json_schema(Verdict)
+    return build_json_schema(Verdict)

@@ -24,7 +24,7 @@ from elastocal.application.statements import format_accuracy
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import apply_step
 from elastocal.fitting.noise import Noise
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import read_cases
 from elastocal.validation.held_out import compute_position_residuals
 from elastocal.validation.transfer import transfer_fit
 
@@ -117,7 +117,7 @@ def campaign(kuka, tmp_path_factory, config_folder):
     """Case, held-out case, fit and calibrated robot of a campaign."""
     folder = tmp_path_factory.mktemp("judged") / "made"
     folder = make_folder(folder, kuka, table=make_table(kuka, "made"))
-    case, held_out = cases_in(folder, config_folder / "robots")
+    case, held_out = read_cases(folder, config_folder / "robots")
     noise = Noise("declared", 6e-5, 6e-5, np.zeros(6))
     fit = fit_model(case.model, case.observations, noise)
     calibrated = calibrate_on_case(case, fit.model, fit.estimate, fit.covariance, noise)

@@ -15,7 +15,7 @@ from elastocal.application.scope import calibrate_on_case, determine_scope
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.noise import Noise
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import read_cases
 from elastocal.mechanics.sites import build_sites
 from elastocal.residual_model.selection import is_commanded
 
@@ -84,7 +84,7 @@ def test_an_unknown_offset_of_the_target_at_the_end_effector_is_no_error(fanuc):
 def case(kuka, tmp_path_factory, config_folder):
     folder = tmp_path_factory.mktemp("repeated") / "made"
     folder = make_folder(folder, kuka, table=make_table(kuka, "made"))
-    return cases_in(folder, config_folder / "robots")[0]
+    return read_cases(folder, config_folder / "robots")[0]
 
 
 def test_repeats_bound_the_repeatability_of_joints_that_the_sensor_hides(case):

@@ -17,9 +17,9 @@ from elastocal_proof.blind.folders import (
     write_blind_campaign,
     write_truth,
 )
-from elastocal_proof.plant.arm import arm_from_file
-from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.physical_robot import specimen
+from elastocal_proof.plant.arm import read_arm
+from elastocal_proof.plant.campaigns import Design, draw_schedule
+from elastocal_proof.plant.simulated_robot import draw_specimen
 
 
 @pytest.mark.parametrize("name", ["kuka", "fanuc", "abb"])
@@ -27,17 +27,17 @@ def test_the_analysis_reads_the_folder_its_angles_and_the_poses_that_are_held_ou
     tmp_path, name
 ):
     small = Design(poses=8, held_out=2, repeated_poses=3, repeats=2)
-    robot = specimen(arm_from_file(ROBOTS / f"{name}.yaml"), 1)
+    robot = draw_specimen(read_arm(ROBOTS / f"{name}.yaml"), 1)
     write_blind_campaign(
         tmp_path / "c",
         "c",
         ROBOTS / f"{name}.yaml",
         robot,
         small,
-        schedule_of(robot.arm, small, 2),
+        draw_schedule(robot.arm, small, 2),
     )
     campaign = read_campaign(read_campaign_folder(tmp_path / "c", ROBOTS))
-    schedule = schedule_of(robot.arm, small, 2)
+    schedule = draw_schedule(robot.arm, small, 2)
     training, held_out = split_poses(campaign)
     assert set(training.pose) == set(schedule.pose[schedule.training])
     assert set(held_out.pose) == set(schedule.pose[~schedule.training])

@@ -11,7 +11,7 @@ from made_blind_documents import PLAN
 from scipy.stats import multivariate_normal
 
 from elastocal.effects.catalogue import candidates_on
-from elastocal.loop.whole import diagnosed
+from elastocal.loop.whole import diagnose_folder
 from elastocal.mechanics.sites import build_sites
 from elastocal_proof.blind import oracle as module
 from elastocal_proof.blind.cases import BlindCase, list_cases, write_sealed_case
@@ -61,7 +61,7 @@ def test_what_the_engine_names_rightly_the_oracle_fits_the_same_and_without_an_e
     tmp_path,
 ):
     truth, folder = made(tmp_path, "joint_offset")
-    verdict = diagnosed(folder, ROBOTS.as_posix(), 1)
+    verdict = diagnose_folder(folder, ROBOTS.as_posix(), 1)
     assert [effect["name"] for effect in verdict["effects"]] == ["joint_offset"]
     found = fit_oracle(truth, verdict, folder, ROBOTS.as_posix(), 1)
     assert found["candidates"] == [f"joint_offset@{truth['defects'][0]['joints'][0]}"]

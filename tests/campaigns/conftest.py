@@ -1,4 +1,4 @@
-"""Fixtures: a campaign's folder that a test spoils before it reads it."""
+"""Fixtures of the tests of campaigns."""
 
 import pytest
 from made_cells import Cell
@@ -6,4 +6,5 @@ from made_cells import Cell
 
 @pytest.fixture
 def cell(tmp_path):
+    """A campaign's folder that a test changes before it is read."""
     return Cell(tmp_path)

@@ -1,4 +1,5 @@
-"""Measurements of a campaign, chosen by mask or index, and as columns of tables."""
+"""Measurements of a campaign are selected by mask or index, and written as columns of
+tables."""
 
 from dataclasses import replace
 
@@ -15,14 +16,15 @@ from elastocal.campaigns.campaign import (
     tabulate_residuals,
 )
 
-PARTS = {
+# Optional arrays of measurements, with their columns.
+OPTIONAL_COLUMNS = {
     "rotation_vector": ("rx", "ry", "rz"),
     "approach": ("approach1", "approach2", "approach3"),
     "time_s": ("time_s",),
     "temperature_c": ("temperature_c",),
     "u95_m": ("u95_m",),
 }
-PLAIN = (
+REQUIRED_COLUMNS = (
     "session",
     "pose",
     "load",
@@ -44,79 +46,76 @@ PLAIN = (
 
 @pytest.fixture
 def measurements(cell):
-    """No two columns are alike."""
+    """Measurements of which no two columns are equal."""
     cell.table["u95_m"] = list(np.linspace(1e-4, 2e-4, len(cell.table["pose"])))
     return cell.read().measurements
 
 
 def test_selected_measurements_come_in_the_order_of_the_index(measurements):
     measurements = replace(measurements, time_s=None)
-    chosen = measurements.select(np.array([5, 2]))
-    assert len(chosen) == 2 and chosen.row.tolist() == [6, 3] and chosen.time_s is None
-    np.testing.assert_array_equal(chosen.position, measurements.position[[5, 2]])
+    selected = measurements.select(np.array([5, 2]))
+    assert len(selected) == 2
+    assert selected.row.tolist() == [6, 3]
+    assert selected.time_s is None
+    np.testing.assert_array_equal(selected.position, measurements.position[[5, 2]])
     assert_same(
         measurements.select(measurements.load == 1),
         measurements.select(np.flatnonzero(measurements.load == 1)),
     )
 
 
-def test_every_number_stands_in_the_column_of_its_name(cell, measurements):
+def test_every_number_is_in_the_column_of_its_name(cell, measurements):
     columns = tabulate_measurements(measurements)
-    assert [*columns] == [*PLAIN, *(name for names in PARTS.values() for name in names)]
+    optional = [name for names in OPTIONAL_COLUMNS.values() for name in names]
+    assert [*columns] == [*REQUIRED_COLUMNS, *optional]
     for name in [*columns.keys() & cell.table.keys() - {"target"}]:
         np.testing.assert_array_equal(columns[name], cell.table[name], err_msg=name)
     assert_same(build_measurements(columns), measurements)
 
 
-@pytest.mark.parametrize("part", PARTS)
-def test_what_was_not_measured_is_an_empty_column_and_is_absent_again(
-    measurements, part
+@pytest.mark.parametrize("array", OPTIONAL_COLUMNS)
+def test_an_array_that_was_not_measured_is_written_as_empty_columns(
+    measurements, array
 ):
-    columns = tabulate_measurements(replace(measurements, **{part: None}))
-    assert {name for name, values in columns.items() if np.isnan(values).any()} == set(
-        PARTS[part]
-    )
-    assert [
-        name
-        for name, values in vars(build_measurements(columns)).items()
-        if values is None
-    ] == [part]
+    columns = tabulate_measurements(replace(measurements, **{array: None}))
+    empty = {name for name, values in columns.items() if np.isnan(values).any()}
+    assert empty == set(OPTIONAL_COLUMNS[array])
+    read_back = vars(build_measurements(columns))
+    missing = [name for name, values in read_back.items() if values is None]
+    assert missing == [array]
 
 
-def test_residuals_of_poses_stand_beside_the_measurements_in_the_positions_that_are_given(
+def test_residuals_are_written_next_to_the_measurements_at_the_given_positions(
     measurements,
 ):
-    some = measurements.select(np.array([3, 9]))
-    before, after = (np.arange(12.0).reshape(2, 6) + start for start in (100.0, 200.0))
+    selected = measurements.select(np.array([3, 9]))
+    before = np.arange(12.0).reshape(2, 6) + 100.0
+    after = np.arange(12.0).reshape(2, 6) + 200.0
     position = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
-    beyond = np.array([False, True])
+    is_beyond = np.array([False, True])
     columns = tabulate_residuals(
-        some,
-        beyond,
+        selected,
+        is_beyond,
         position,
         {"before": before, "after": after[:, :3]},
         held_out=False,
         gross_errors=False,
     )
+    expected_after = np.column_stack([after[:, :3], np.full((2, 3), np.nan)])
     for number, component in enumerate(("dx", "dy", "dz", "rx", "ry", "rz")):
         np.testing.assert_array_equal(columns[f"before_{component}"], before[:, number])
         np.testing.assert_array_equal(
-            columns[f"after_{component}"],
-            after[:, number] if number < 3 else [np.nan] * 2,
+            columns[f"after_{component}"], expected_after[:, number]
         )
     np.testing.assert_array_equal([columns[axis] for axis in "xyz"], position.T)
-    whole = tabulate_measurements(some)
-    assert all(
-        (columns[name] == whole[name]).all() for name in ("row", "q2", "mz", "time_s")
-    )
+    expected = tabulate_measurements(selected)
+    for name in ("row", "q2", "mz", "time_s"):
+        assert (columns[name] == expected[name]).all()
     assert columns["outside_range"].tolist() == [False, True]
-    own = {
-        "held_out",
-        "gross_error",
-        "outside_range",
-        *(name for name in columns if name.startswith(("before", "after"))),
-    }
-    assert columns.keys() - own == {*PLAIN, "time_s"}
+    of_residuals = {
+        name for name in columns if name.startswith(("before", "after"))
+    } | {"held_out", "gross_error", "outside_range"}
+    assert columns.keys() - of_residuals == {*REQUIRED_COLUMNS, "time_s"}
 
 
 @given(
@@ -127,7 +126,7 @@ def test_residuals_of_poses_stand_beside_the_measurements_in_the_positions_that_
     )
 )
 @settings(max_examples=30)
-def test_groups_are_those_of_numpy_unique(rows):
+def test_equal_rows_are_grouped_as_by_numpy_unique(rows):
     keys = np.array(rows)
     _, expected_first, expected = np.unique(
         keys, axis=0, return_index=True, return_inverse=True

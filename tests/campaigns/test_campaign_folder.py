@@ -1,4 +1,4 @@
-"""A campaign's folder is read once, whatever is asked of it afterwards."""
+"""The documents of a campaign's folder are read only once."""
 
 import hashlib
 import shutil
@@ -13,7 +13,7 @@ from elastocal.campaigns.reading import read_campaign, read_held_out_campaign
 
 @pytest.fixture
 def read_files(monkeypatch):
-    """Documents that were read, in their order."""
+    """Paths of the documents that have been read, in their order."""
     files = []
     read_document = campaign_folder.read_document
 
@@ -27,7 +27,7 @@ def read_files(monkeypatch):
 
 @pytest.fixture
 def validated_cell(cell, tmp_path):
-    """A cell that a copy of it validates."""
+    """A campaign that is validated by a copy of itself."""
     cell.write()
     shutil.copytree(cell.folder, tmp_path / "other")
     cell.document["holdout"] = {"campaign": "../other"}
@@ -41,15 +41,15 @@ def test_every_document_is_read_once(validated_cell, read_files):
         read_campaign(folder)
         read_held_out_campaign(folder)
         assert folder.files() == [*folder.digests]
-    other = f"{validated_cell.folder}/../other"
+    validation_folder = f"{validated_cell.folder}/../other"
     assert sorted(read_files) == sorted(
         f"{path}/{name}"
-        for path in (validated_cell.folder, other)
+        for path in (validated_cell.folder, validation_folder)
         for name in ("campaign.yaml", "arm.yaml")
     )
 
 
-def test_the_files_of_a_campaign_are_found_without_its_robot_being_read(
+def test_the_files_of_a_campaign_are_listed_without_reading_its_robot(
     validated_cell, read_files
 ):
     folder = validated_cell.open()

@@ -1,5 +1,5 @@
-"""Files of measurements: both kinds hold the same, and every fault of a file, a column
-or a cell is refused in one line."""
+"""Measurements in text and in Parquet files are the same, and every fault of a file, a
+column or a cell is refused in one line."""
 
 import struct
 from dataclasses import replace
@@ -15,14 +15,12 @@ from elastocal.campaigns import measurements as module
 from elastocal.campaigns.reading import read_campaign
 
 
-def test_a_spreadsheets_marks_blanks_and_lines_of_its_own_are_passed_over_and_counted(
+def test_marks_blanks_and_empty_lines_of_a_spreadsheet_are_skipped_and_counted(
     cell,
 ):
-    whole = cell.read().measurements
-    cell.table = {
-        name: [str(each).replace(".", ",") for each in column]
-        for name, column in cell.table.items()
-    }
+    expected = cell.read().measurements
+    for name, column in cell.table.items():
+        cell.table[name] = [str(entry).replace(".", ",") for entry in column]
     cell.write(separator=";")
     path = cell.folder / "measurements.csv"
     lines = path.read_text(encoding="utf-8").splitlines()
@@ -34,14 +32,14 @@ def test_a_spreadsheets_marks_blanks_and_lines_of_its_own_are_passed_over_and_co
     path.write_text(text, encoding="utf-8")
     measurements = read_campaign(cell.open()).measurements
     assert measurements.row.tolist()[:5] == [1, 2, 4, 6, 7]
-    assert_same(replace(measurements, row=whole.row), whole)
+    assert_same(replace(measurements, row=expected.row), expected)
     path.write_text(text.replace("\n0; 0; 0; A", "\n0; 0; no; A"), encoding="utf-8")
     with refused(cell.measurements, "line 5, column repeat", "'no'"):
         read_campaign(cell.open())
 
 
 @pytest.mark.parametrize(
-    ("row", "column", "entry", "words"),
+    ("row", "column", "entry", "phrases"),
     [
         (3, "q2", "0.1.2", ["'0.1.2'", "a number"]),
         (3, "q2", "", ["nothing", "a number"]),
@@ -59,14 +57,14 @@ def test_a_spreadsheets_marks_blanks_and_lines_of_its_own_are_passed_over_and_co
         (14, "temperature_c", 293.15, ["-200 to 200"]),
     ],
 )
-def test_faulty_cell_is_refused_by_row_and_column(cell, row, column, entry, words):
+def test_a_faulty_cell_is_refused_by_row_and_column(cell, row, column, entry, phrases):
     cell.table["u95_m"] = [1e-4] * len(cell.table["pose"])
     cell.spoil(row, column, entry)
-    with refused(cell.measurements, f"line {row + 1}, column {column}:", *words):
+    with refused(cell.measurements, f"line {row + 1}, column {column}:", *phrases):
         cell.read()
 
 
-def test_faulty_cell_of_a_parquet_file_is_refused_alike(cell):
+def test_a_faulty_cell_of_a_parquet_file_is_refused_likewise(cell):
     cell.spoil(5, "x", None)
     cell.write("parquet")
     with refused(
@@ -79,7 +77,7 @@ def test_faulty_cell_of_a_parquet_file_is_refused_alike(cell):
 
 
 @pytest.mark.parametrize("missing", ["load", "q3", "rz", "mx", "approach1"])
-def test_missing_column_is_refused(cell, missing):
+def test_a_missing_column_is_refused(cell, missing):
     cell.without(missing)
     with refused(cell.measurements, "header", f"no column {missing!r}", f"{missing}: "):
         cell.read()
@@ -93,7 +91,7 @@ def test_missing_column_is_refused(cell, missing):
         ("q4", "q3, u95_m, for 3 joints"),
     ],
 )
-def test_unknown_column_is_refused_with_the_closest_known(cell, name, hint):
+def test_an_unknown_column_is_refused_with_the_closest_name(cell, name, hint):
     old = {"Load": "load", "temperature": "temperature_c", "q4": "q3"}[name]
     cell.table = {
         name if column == old else column: cells for column, cells in cell.table.items()
@@ -102,7 +100,7 @@ def test_unknown_column_is_refused_with_the_closest_known(cell, name, hint):
         cell.read()
 
 
-def test_more_measurements_than_fit_into_memory_are_refused(cell, monkeypatch):
+def test_files_that_are_too_large_for_memory_are_refused(cell, monkeypatch):
     cell.write("parquet")
     rows = len(cell.table["pose"])
     path = cell.folder / "measurements.parquet"
@@ -117,7 +115,7 @@ def test_more_measurements_than_fit_into_memory_are_refused(cell, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("text", "key", "words"),
+    ("text", "key", "phrases"),
     [
         (b"load,repeat\n0,0\n", "line 1", ["a header with pose"]),
         (b"pose,load\n0,0\n0,0,0\n", "line 3", ["3 cells", "2, one for each column"]),
@@ -125,14 +123,14 @@ def test_more_measurements_than_fit_into_memory_are_refused(cell, monkeypatch):
         (b"pose,x,pose\n0,0,0\n", "line 1", ["column 'pose' twice", "once"]),
     ],
 )
-def test_file_that_is_no_table_is_refused(cell, text, key, words):
+def test_a_file_that_is_no_table_is_refused(cell, text, key, phrases):
     cell.write()
     (cell.folder / "measurements.csv").write_bytes(text)
-    with refused(cell.measurements, key, *words):
+    with refused(cell.measurements, key, *phrases):
         read_campaign(cell.open())
 
 
-def test_one_altered_byte_of_parquet_with_checksums_is_found(cell):
+def test_one_altered_byte_of_a_parquet_file_with_checksums_is_detected(cell):
     cell.write()
     path = cell.folder / "measurements.parquet"
     pq.write_table(
@@ -145,27 +143,29 @@ def test_one_altered_byte_of_parquet_with_checksums_is_found(cell):
     (cell.folder / "measurements.csv").unlink()
     read_campaign(cell.open())
     content = bytearray(path.read_bytes())
-    place = content.index(struct.pack("<d", cell.table["x"][10]))
-    content[place] ^= 1
+    position = content.index(struct.pack("<d", cell.table["x"][10]))
+    content[position] ^= 1
     path.write_bytes(content)
     with refused(path.as_posix(), "", "no readable Parquet file"):
         read_campaign(cell.open())
 
 
 @pytest.mark.parametrize(
-    ("column", "entry", "found"),
+    ("column", "entry", "kind"),
     [("x", "1", "string"), ("x", True, "bool"), ("target", b"A", "binary")],
 )
-def test_a_column_of_parquet_holds_numbers_or_text(cell, column, entry, found):
+def test_a_column_of_a_parquet_file_must_hold_numbers_or_text(
+    cell, column, entry, kind
+):
     cell.table[column] = [entry] * len(cell.table[column])
     cell.write("parquet")
     with refused(
-        cell.folder / "measurements.parquet", f"column {column}", found, "numbers"
+        cell.folder / "measurements.parquet", f"column {column}", kind, "numbers"
     ):
         read_campaign(cell.open())
 
 
-def test_one_file_of_measurements_must_be_there(cell):
+def test_there_must_be_exactly_one_file_of_measurements(cell):
     cell.write()
     cell.write("parquet")
     with refused(
@@ -180,7 +180,7 @@ def test_one_file_of_measurements_must_be_there(cell):
         read_campaign(cell.open())
 
 
-def test_a_sheet_may_be_ticked_and_have_degrees_that_agree(cell):
+def test_a_sheet_may_have_ticks_and_a_column_in_degrees_that_agrees(cell):
     cell.table["done"] = ["x"] * len(cell.table["pose"])
     cell.table["q2_deg"] = np.degrees(cell.table["q2"]).round(3)
     cell.write()
@@ -191,7 +191,7 @@ def test_a_sheet_may_be_ticked_and_have_degrees_that_agree(cell):
         cell.read()
 
 
-def test_what_a_small_file_of_parquet_would_grow_to_is_refused_before_it_is_read(
+def test_a_parquet_file_that_would_expand_too_much_is_refused_before_it_is_read(
     cell, monkeypatch
 ):
     monkeypatch.setattr(pq, "read_table", None)

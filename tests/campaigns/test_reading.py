@@ -1,4 +1,4 @@
-"""A campaign's folder: what it means, and that every fault of it is refused in one
+"""A campaign's folder is read as documented, and every fault in it is refused in one
 line."""
 
 import os
@@ -14,60 +14,55 @@ from elastocal.campaigns.reading import read_campaign, read_held_out_campaign
 from elastocal.campaigns.writing import write_campaign
 
 
-def test_campaign_is_read_as_written(cell):
-    stated = {
+def test_a_campaign_is_read_as_written(cell):
+    noise = {"position_m": 6e-5, "orientation_rad": 7e-5}
+    cell.document |= {
         "compliance": "identify",
         "declared": ["joint_offset"],
-        "noise": {"position_m": 6e-5, "orientation_rad": 7e-5},
+        "noise": noise,
+        "holdout": {"fraction": 0.4, "seed": 5},
     }
-    cell.document |= stated | {"holdout": {"fraction": 0.4, "seed": 5}}
     campaign = cell.read(effects=["joint_offset"])
-    table = cell.table
-    assert (campaign.name, campaign.robot.name, campaign.measured, campaign.frame) == (
-        "cell7",
-        "three joints",
-        "pose",
-        "base",
-    )
+    assert campaign.name == "cell7"
+    assert campaign.robot.name == "three joints"
+    assert campaign.measured == "pose"
+    assert campaign.frame == "base"
     assert campaign.targets == (
         Target("A", "elbow", (0.0, 0.0, 0.1)),
         Target("B", "hand", None),
     )
-    assert (campaign.compliance, campaign.declared, campaign.noise) == (
-        "identify",
-        ("joint_offset",),
-        stated["noise"],
-    )
+    assert campaign.compliance == "identify"
+    assert campaign.declared == ("joint_offset",)
+    assert campaign.noise == noise
     assert campaign.holdout == {"fraction": 0.4, "seed": 5}
+
+
+def test_measurements_are_read_as_written(cell):
+    campaign = cell.read()
     measurements = campaign.measurements
     assert len(measurements) == POSES * LOADS * REPEATS * 2
-    assert [campaign.targets[index].name for index in measurements.target] == table[
-        "target"
-    ]
+    targets = [campaign.targets[index].name for index in measurements.target]
+    assert targets == cell.table["target"]
     expected = {
-        name: table[name]
-        for name in ("pose", "load", "repeat", "time_s", "temperature_c")
-    }
-    expected |= {
         "session": np.zeros(len(measurements)),
         "row": np.arange(1, len(measurements) + 1),
     }
-    groups = {
+    for name in ("pose", "load", "repeat", "time_s", "temperature_c"):
+        expected[name] = cell.table[name]
+    columns_of_arrays = {
         "joint_angles": ("q1", "q2", "q3"),
         "wrench": WRENCH,
         "position": "xyz",
         "rotation_vector": ("rx", "ry", "rz"),
+        "approach": ("approach1", "approach2", "approach3"),
     }
-    groups["approach"] = ("approach1", "approach2", "approach3")
-    expected |= {
-        part: np.column_stack([table[name] for name in names])
-        for part, names in groups.items()
-    }
-    for part, values in expected.items():
-        np.testing.assert_array_equal(getattr(measurements, part), values, err_msg=part)
+    for name, columns in columns_of_arrays.items():
+        expected[name] = np.column_stack([cell.table[column] for column in columns])
+    for name, values in expected.items():
+        np.testing.assert_array_equal(getattr(measurements, name), values, err_msg=name)
 
 
-def test_a_mount_is_turned_as_stated_or_unknown_and_left_out_as_the_offset_is(cell):
+def test_the_rotation_of_a_mount_is_as_stated_or_unknown_if_the_offset_is(cell):
     targets = cell.document["targets"] = {
         name: dict(target) for name, target in DOCUMENT["targets"].items()
     }
@@ -82,34 +77,29 @@ def test_a_mount_is_turned_as_stated_or_unknown_and_left_out_as_the_offset_is(ce
         (0.0, 0.0, 0.0),
         (0.0, 1.0, 0.0),
     ]
-    for wrong, words in (
+    for invalid, phrase in (
         ([0, 0, 92], "not degrees"),
         ([0, 0], "3 entries"),
         ("known", "unknown"),
     ):
-        targets["B"]["rotation"] = wrong
-        with refused(cell.source, "targets.B.rotation", words):
+        targets["B"]["rotation"] = invalid
+        with refused(cell.source, "targets.B.rotation", phrase):
             cell.read()
 
 
-def test_what_a_campaign_leaves_out_has_a_default(cell):
+def test_optional_entries_and_columns_have_defaults(cell):
     cell.without("approach1", "approach2", "approach3", "time_s", "temperature_c")
     campaign = cell.read()
-    assert (campaign.compliance, campaign.declared, campaign.noise) == (
-        "nominal",
-        (),
-        None,
-    )
+    assert campaign.compliance == "nominal"
+    assert campaign.declared == ()
+    assert campaign.noise is None
     assert campaign.holdout == {"fraction": 0.3, "seed": 1}
-    assert (
-        campaign.measurements.approach
-        is campaign.measurements.time_s
-        is campaign.measurements.temperature_c
-        is None
-    )
+    assert campaign.measurements.approach is None
+    assert campaign.measurements.time_s is None
+    assert campaign.measurements.temperature_c is None
 
 
-def test_uncertainties_of_measurements_are_read_and_stand_alone(cell):
+def test_uncertainties_of_measurements_are_read_and_exclude_a_declared_noise(cell):
     cell.document.pop("noise", None)
     cell.table["u95_m"] = [1e-4] * len(cell.table["pose"])
     np.testing.assert_array_equal(cell.read().measurements.u95_m, cell.table["u95_m"])
@@ -122,7 +112,7 @@ def test_uncertainties_of_measurements_are_read_and_stand_alone(cell):
         cell.read()
 
 
-def test_sense_of_approach_is_that_of_the_models_joints(cell):
+def test_the_direction_of_approach_is_that_of_the_models_joints(cell):
     cell.arm["reported_joints"] = {"matrix": [[1, 0, 0], [0, -1, 0], [0, 1, 1]]}
     second = np.array(cell.table["approach2"])
     third = np.array(cell.table["approach3"])
@@ -131,36 +121,33 @@ def test_sense_of_approach_is_that_of_the_models_joints(cell):
     np.testing.assert_array_equal(approach[:, 2], np.where(second == third, second, 0))
 
 
-def other_campaign(cell, tmp_path, **changes):
-    """Write a campaign beside the cell's, with targets of its own, and hold it out."""
+def hold_out_campaign(cell, tmp_path):
+    """Write a campaign with its own targets next to the cell, and hold it out."""
     table = cell.table | {
         "target": ["T"] * len(cell.table["pose"]),
         "repeat": list(range(len(cell.table["pose"]))),
     }
-    document = (
-        cell.document
-        | {
-            "campaign": "other",
-            "targets": {"T": DOCUMENT["targets"]["B"]},
-            "robot": "planar",
-        }
-        | changes
-    )
+    document = cell.document | {
+        "campaign": "other",
+        "targets": {"T": DOCUMENT["targets"]["B"]},
+        "robot": "planar",
+    }
     write_campaign(tmp_path / "other", document, table, 3)
     cell.document["holdout"] = {"campaign": "../other"}
 
 
-def test_other_campaign_of_the_same_chain_is_the_test_of_all_measurements(
+def test_another_campaign_of_the_same_chain_validates_a_fit_to_all_measurements(
     cell, tmp_path
 ):
-    other_campaign(cell, tmp_path)
+    hold_out_campaign(cell, tmp_path)
     campaign = cell.read()
     training, held_out = split_poses(campaign)
     assert len(held_out) == 0
     assert_same(training, campaign.measurements)
-    other = read_held_out_campaign(cell.open())
-    assert (other.name, [target.name for target in other.targets]) == ("other", ["T"])
-    assert len(other.measurements) == len(campaign.measurements)
+    validation = read_held_out_campaign(cell.open())
+    assert validation.name == "other"
+    assert [target.name for target in validation.targets] == ["T"]
+    assert len(validation.measurements) == len(campaign.measurements)
     cell.arm["chain"] = ARM["chain"].replace("0.7", "0.8")
     cell.write()
     with refused(cell.source, "holdout.campaign", "another chain", "the same chain"):
@@ -168,7 +155,7 @@ def test_other_campaign_of_the_same_chain_is_the_test_of_all_measurements(
 
 
 @pytest.mark.parametrize(
-    ("changes", "key", "words"),
+    ("changes", "key", "phrases"),
     [
         ({"robbot": "arm.yaml"}, "robbot", ["unknown key", "'robot'?"]),
         (
@@ -229,22 +216,23 @@ def test_other_campaign_of_the_same_chain_is_the_test_of_all_measurements(
         ),
     ],
 )
-def test_faulty_document_is_refused_in_one_line(cell, changes, key, words):
+def test_a_faulty_document_is_refused_in_one_line(cell, changes, key, phrases):
     cell.document |= changes
-    with refused(f"{cell.source}: ", f" {key}", *words):
+    with refused(f"{cell.source}: ", f" {key}", *phrases):
         cell.read(effects=["joint_offset", "payload"])
 
 
-def test_loads_on_compliances_that_nobody_states_nor_identifies_are_refused(cell):
+def test_loads_are_refused_if_compliances_are_neither_stated_nor_identified(cell):
     del cell.arm["compliance_urad_per_Nm"]
     with refused(cell.source, "compliance", "nominal", "arm.yaml", "identify"):
         cell.read()
     cell.document["compliance"] = "identify"
     robot = cell.read().robot
-    assert not robot.compliance_known and (robot.compliance > 0).all()
+    assert not robot.compliance_known
+    assert (robot.compliance > 0).all()
 
 
-def test_without_loads_joints_of_unknown_compliance_are_rigid_and_masses_turn_nothing(
+def test_without_loads_unknown_compliances_are_zero_and_masses_are_ignored(
     cell,
 ):
     del cell.arm["compliance_urad_per_Nm"]
@@ -254,16 +242,18 @@ def test_without_loads_joints_of_unknown_compliance_are_rigid_and_masses_turn_no
     cell.keep(np.flatnonzero(np.equal(cell.table["load"], 0)))
     robot = cell.read().robot
     np.testing.assert_array_equal(robot.compliance, np.zeros(3))
-    assert robot.masses == () and not robot.compliance_known
+    assert robot.masses == ()
+    assert not robot.compliance_known
     cell.arm["compliance_urad_per_Nm"] = [1, 2, 3]
-    assert cell.read().robot.masses and cell.read().robot.compliance_known
+    assert cell.read().robot.masses
+    assert cell.read().robot.compliance_known
 
 
 @pytest.mark.parametrize(
     "name", ["/etc/passwd", "../secret", "../../etc/passwd", "x" * 5000, "link.yaml"]
 )
-def test_no_file_outside_of_the_folder_is_read_for_a_robot_nor_shown(cell, name):
-    """The folder of robots is not outside."""
+def test_no_file_outside_the_folder_is_read_or_shown_as_a_robot(cell, name):
+    """The folder of robots does not count as outside."""
     cell.write()
     secret = cell.folder.parent / "secret"
     secret.write_text("password: 1\n")
@@ -279,7 +269,7 @@ def test_no_file_outside_of_the_folder_is_read_for_a_robot_nor_shown(cell, name)
     "file", ["campaign.yaml", "measurements.csv", "measurements.parquet"]
 )
 @pytest.mark.parametrize("kind", ["link", "pipe", "folder", "link out"])
-def test_what_is_no_file_of_the_folder_is_called_what_it_is_without_a_look_at_it(
+def test_a_link_pipe_or_folder_instead_of_a_file_is_named_and_not_opened(
     cell, file, kind
 ):
     cell.write()
@@ -288,23 +278,22 @@ def test_what_is_no_file_of_the_folder_is_called_what_it_is_without_a_look_at_it
     path.unlink(missing_ok=True)
     if kind.startswith("link"):
         path.symlink_to(elsewhere)
+    elif kind == "pipe":
+        os.mkfifo(path)
     else:
-        os.mkfifo(path) if kind == "pipe" else path.mkdir()
+        path.mkdir()
+    phrase = f"found a {kind} that leads to no file"
     if kind == "link out":
         elsewhere.write_text("{")
-    found = (
-        "a link out of the campaign's folder"
-        if kind == "link out"
-        else f"found a {kind} that leads to no file"
-    )
-    with refused(path, "", found):
+        phrase = "a link out of the campaign's folder"
+    with refused(path, "", phrase):
         read_campaign(cell.open())
-    with refused(path, "", found):
+    with refused(path, "", phrase):
         cell.open().files()
 
 
 @pytest.mark.parametrize(
-    ("row", "column", "entry", "words"),
+    ("row", "column", "entry", "phrases"),
     [
         (9, "approach2", 0.5, ["0.5", "-1, 0 or 1"]),
         (6, "target", "a", ["'a'", "'A'? (A, B)"]),
@@ -314,16 +303,17 @@ def test_what_is_no_file_of_the_folder_is_called_what_it_is_without_a_look_at_it
         (12, "rx", 45.0, ["a turn of", "not degrees"]),
     ],
 )
-def test_implausible_cell_is_refused_by_line_and_column(
-    cell, row, column, entry, words
+def test_an_implausible_cell_is_refused_by_line_and_column(
+    cell, row, column, entry, phrases
 ):
     cell.spoil(row, column, entry)
-    with refused(cell.measurements, f"line {row + 1}, column {column}", *words):
+    with refused(cell.measurements, f"line {row + 1}, column {column}", *phrases):
         cell.read()
 
 
-def test_what_few_rows_alone_are_off_is_left_to_the_diagnosis(cell):
-    """A unit is wrong in a whole file; a mistyped cell is a gross error of its row."""
+def test_a_few_wrong_rows_are_left_to_the_diagnosis(cell):
+    """A wrong unit affects a whole file. A mistyped cell is a gross error of its
+    row."""
     cell.spoil(40, "y", 812.4)
     assert cell.read().measurements.position[39, 1] == 812.4
     for row in range(1, 25):
@@ -334,7 +324,7 @@ def test_what_few_rows_alone_are_off_is_left_to_the_diagnosis(cell):
         cell.read()
 
 
-def test_a_whole_file_in_degrees_and_the_same_measurement_twice_are_refused(cell):
+def test_a_repeated_measurement_and_a_whole_file_in_degrees_are_refused(cell):
     cell.spoil(7, "repeat", 0)
     with refused(
         cell.measurements,
@@ -349,7 +339,7 @@ def test_a_whole_file_in_degrees_and_the_same_measurement_twice_are_refused(cell
         cell.read()
 
 
-def test_load_without_columns_of_the_wrench_is_refused(cell):
+def test_a_load_without_wrench_columns_is_refused(cell):
     cell.without(*WRENCH)
     with refused(
         cell.measurements, "line 6, column load", "found '1'", "no columns fx"

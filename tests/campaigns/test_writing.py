@@ -1,5 +1,5 @@
-"""Campaigns written to a folder: they are those read, and one that cannot be written
-leaves what was there."""
+"""A written campaign is read back unchanged, and a campaign that cannot be written
+leaves the folder as it was."""
 
 import pyarrow as pa
 import pytest
@@ -18,16 +18,16 @@ from elastocal.io.documents import check_document, read_schema
 
 
 @pytest.mark.parametrize("kind", ["csv", "parquet"])
-def test_written_campaign_is_the_one_read_and_one_that_cannot_be_written_leaves_it(
+def test_a_campaign_is_read_back_and_a_faulty_one_does_not_replace_it(
     cell, tmp_path, kind
 ):
-    first = cell.read()
+    campaign = cell.read()
     folder = tmp_path / "again"
     document = cell.document | {"robot": "planar"}
     write_campaign(folder, document, cell.table, 3, kind)
-    second = read_campaign(read_campaign_folder(folder, cell.robots))
-    assert_same(first.measurements, second.measurements)
-    assert second.targets == first.targets
+    read_back = read_campaign(read_campaign_folder(folder, cell.robots))
+    assert_same(campaign.measurements, read_back.measurements)
+    assert read_back.targets == campaign.targets
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     assert sorted(before) == ["campaign.yaml", f"measurements.{kind}"]
     with refused((folder / f"measurements.{kind}").as_posix(), "header", "'q4'"):
@@ -39,17 +39,17 @@ def test_written_campaign_is_the_one_read_and_one_that_cannot_be_written_leaves_
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
 
-def test_every_key_is_explained_and_those_left_out_are_valid_once_uncommented(kuka):
+def test_the_template_explains_every_key_and_its_commented_keys_are_valid(kuka):
     text = format_campaign_template("cell", kuka)
-    known = read_schema("campaign")["properties"]
+    keys = read_schema("campaign")["properties"]
     lines = text.splitlines()
-    shown = yaml.safe_load(text)
-    check_document(shown, "campaign", "template")
-    assert set(known) <= {line.removeprefix("# ").partition(":")[0] for line in lines}
+    document = yaml.safe_load(text)
+    check_document(document, "campaign", "template")
+    assert set(keys) <= {line.removeprefix("# ").partition(":")[0] for line in lines}
     for number, line in enumerate(lines):
-        if line.startswith("# ") and line[2:].partition(":")[0] in known:
+        if line.startswith("# ") and line[2:].partition(":")[0] in keys:
             assert lines[number - 1].startswith("# "), "explained above"
-            check_document(shown | yaml.safe_load(line[2:]), "campaign", line)
+            check_document(document | yaml.safe_load(line[2:]), "campaign", line)
     assert (
         format_sheet_header(2)
         == "pose,load,repeat,target,q1,q2,fx,fy,fz,mx,my,mz,x,y,z\n"

@@ -24,7 +24,7 @@ from elastocal.command.terminal import (
     print_lines,
 )
 from elastocal.errors import InputError
-from elastocal.io.origin import environment
+from elastocal.io.origin import list_versions
 
 
 @pytest.mark.parametrize(
@@ -125,9 +125,9 @@ def test_results_of_another_environment_come_with_a_warning(in_checkout, capsys)
     assert load_diagnosed_campaign(folder).name == "made"
     assert not capsys.readouterr().err
     files = read_campaign_folder("made", ROBOTS).files()
-    record_jobs("made", files, environment(".") | {"numpy": "1.0"})
+    record_jobs("made", files, list_versions(".") | {"numpy": "1.0"})
     assert load_diagnosed_campaign(folder).name == "made"
-    version = environment(".")["numpy"]
+    version = list_versions(".")["numpy"]
     assert capsys.readouterr().err == (
         f"warning: {folder} was diagnosed with numpy 1.0; here are numpy {version}\n"
     )

@@ -5,7 +5,7 @@ from made_folders import make_folder, make_table
 
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.settings import Settings
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import read_cases
 
 
 @pytest.fixture(scope="session")
@@ -14,7 +14,7 @@ def cases(kuka, config_folder, tmp_path_factory):
     reports, which is not declared."""
     folder = tmp_path_factory.mktemp("cases") / "made"
     make_folder(folder, kuka, table=make_table(kuka, "made", offset_of_joint_3=1e-3))
-    return cases_in(folder, config_folder / "robots")
+    return read_cases(folder, config_folder / "robots")
 
 
 @pytest.fixture(scope="session")

@@ -11,7 +11,7 @@ from made_folders import PLAN, make_folder, make_table
 from elastocal.application.calibrated import compute_nominal_poses
 from elastocal.campaigns.writing import write_campaign
 from elastocal.exchange.measurement_table import ImportOptions, read_measurement_table
-from elastocal.loop.whole import cases_in, diagnosed
+from elastocal.loop.whole import diagnose_folder, read_cases
 
 NOISE_M = 5e-5
 POSES = 60
@@ -80,7 +80,7 @@ def verdict_on(folder, damage=(), **changes):
         "holdout": {"poses": HELD_OUT},
     }
     write_campaign(folder, document | changes, table, robot.joints, "csv")
-    return diagnosed(folder, ROBOTS, 1)
+    return diagnose_folder(folder, ROBOTS, 1)
 
 
 def places(verdict):
@@ -193,18 +193,18 @@ def assert_a_lost_held_out_row_changes_nothing(folder, number, whole):
     order = np.lexsort([table["load"], table["pose"]])
     table = {name: column[order] for name, column in table.items()}
     clean = imported(folder / "clean", table, [])
-    rows = cases_in(clean, ROBOTS)[1].campaign.measurements.row
+    rows = read_cases(clean, ROBOTS)[1].campaign.measurements.row
     lost = int(np.random.default_rng(number).choice(rows))
     damaged = imported(folder / "damaged", table, [lost - 1])
     before, after = (
-        cases_in(each, ROBOTS)[0].campaign.measurements for each in (clean, damaged)
+        read_cases(each, ROBOTS)[0].campaign.measurements for each in (clean, damaged)
     )
     for name in ("position", "joint_angles", "wrench", "row"):
         np.testing.assert_array_equal(
             getattr(before, name), getattr(after, name), err_msg=f"{number}: {name}"
         )
     if whole:
-        verdicts = [diagnosed(each, ROBOTS, 1) for each in (clean, damaged)]
+        verdicts = [diagnose_folder(each, ROBOTS, 1) for each in (clean, damaged)]
         assert facts_of(verdicts[0]) == facts_of(verdicts[1]), number
         assert named_rows(verdicts[1]) == sorted({*named_rows(verdicts[0]), lost}), (
             number

@@ -10,8 +10,8 @@ import pytest
 from loop_scripts import ANALYSIS, Files, run_loop
 from made_folders import PLAN, make_folder, make_table
 
-from elastocal.loop.diagnosis_tables import candidate_rows
-from elastocal.loop.whole import diagnosed
+from elastocal.loop.diagnosis_tables import tabulate_candidates
+from elastocal.loop.whole import diagnose_folder
 
 ROOT = Path(__file__).resolve().parents[2]
 ROBOTS = ROOT / "config" / "robots"
@@ -26,7 +26,7 @@ def both(kuka, tmp_path_factory):
     for kind, offset in (("named", 1e-3), ("adequate", 0.0)):
         table = make_table(kuka, "made", plan=PLAN, offset_of_joint_3=offset)
         folder = make_folder(tmp_path_factory.mktemp(kind) / "made", kuka, table=table)
-        verdict = as_json(diagnosed(folder.as_posix(), ROBOTS.as_posix(), SEED))
+        verdict = as_json(diagnose_folder(folder.as_posix(), ROBOTS.as_posix(), SEED))
         assert verdict["verdict"] == kind
         found[kind] = folder, verdict
     assert [effect["name"] for effect in found["named"][1]["effects"]] == [
@@ -73,7 +73,7 @@ def test_rules_come_to_the_same_verdict_with_their_tables_between_the_steps(
 def test_every_candidate_is_in_the_table_tested_or_with_a_reason(diagnosis):
     table = {
         name: column.to_numpy()
-        for name, column in pd.DataFrame(candidate_rows(diagnosis)).items()
+        for name, column in pd.DataFrame(tabulate_candidates(diagnosis)).items()
     }
     assert set(table["candidate"]) == set(diagnosis.case.candidates)
     tested = np.isfinite(table["log_bayes_factor"])

@@ -14,7 +14,7 @@ from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.next_experiment import propose_experiment
 from elastocal.diagnosis.settings import Settings
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import read_cases
 
 OFFSET = 1e-3
 
@@ -33,7 +33,7 @@ def diagnosed(kuka, config_folder, tmp_path_factory):
             for name, values in table.items()
         }
         changes = {"noise": {"position_m": declared_m}, "declared": ["link_geometry"]}
-        case, _ = cases_in(
+        case, _ = read_cases(
             make_folder(folder, kuka, table=table, **changes), config_folder / "robots"
         )
         found[declared_m] = diagnose(case, Settings(), 1)
@@ -44,7 +44,7 @@ def test_a_model_that_is_kept_without_what_was_found_has_the_noise_that_it_leave
     kuka, config_folder, tmp_path
 ):
     table = make_table(kuka, "made", plan=PLAN, offset_of_joint_3=OFFSET)
-    case, _ = cases_in(
+    case, _ = read_cases(
         make_folder(tmp_path / "made", kuka, table=table, declared=[]),
         config_folder / "robots",
     )
@@ -98,7 +98,7 @@ def test_an_error_that_all_measurements_of_a_pose_share_is_noise_of_the_model_an
         f"q{joint}": table[f"q{joint}"] + drawn[table["pose"], joint - 1]
         for joint in range(1, 7)
     }
-    case, _ = cases_in(
+    case, _ = read_cases(
         make_folder(tmp_path / "made", kuka, table=table), config_folder / "robots"
     )
     found = diagnose(case, Settings(), 1)
@@ -140,7 +140,7 @@ def test_measurements_at_fault_end_the_diagnosis_at_the_declared_model(
     verdict, names, case, monkeypatch
 ):
     found = [Fault(name, (), "as measured", (), (1.0, 1.0)) for name in names]
-    monkeypatch.setattr(module, "faults", lambda campaign: found)
+    monkeypatch.setattr(module, "find_faults", lambda campaign: found)
     monkeypatch.setattr(module, "_settle_rows", None)
     diagnosis = diagnose(case, Settings(), 1)
     document = diagnosis.document
@@ -163,7 +163,7 @@ def test_frames_alone_are_kept_where_they_predict_left_out_poses_better(
     folder = make_folder(
         tmp_path / "made", kuka, table=table, declared=["link_geometry"]
     )
-    case, held_out = cases_in(folder, config_folder / "robots")
+    case, held_out = read_cases(folder, config_folder / "robots")
     settings = replace(Settings(), numbers_a_parameter=np.inf)
     usual = diagnose(case, settings, 1)
     assert usual.document["kept"] != "frames" and not any(

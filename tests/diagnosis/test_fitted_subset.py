@@ -12,7 +12,7 @@ from elastocal.diagnosis.fitted_subset import fit_subset, select_initial_subset
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import get_parameter_values
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import read_cases
 
 SETTINGS = Settings()
 
@@ -78,7 +78,7 @@ def test_an_outlying_repeat_that_no_average_contains_is_left_out(
 ):
     table = make_table(kuka, "made", plan=replace(PLAN, repeats=3, repeated_poses=4))
     folder = make_folder(tmp_path / "made", kuka, table=table)
-    case, _ = cases_in(folder, config_folder / "robots")
+    case, _ = read_cases(folder, config_folder / "robots")
     measurements = case.campaign.measurements
     states = list(
         zip(measurements.pose, measurements.load, measurements.target, strict=True)

@@ -9,7 +9,7 @@ from made_folders import PLAN, make_folder, make_table
 
 from elastocal.diagnosis.fitted_subset import select_initial_subset
 from elastocal.diagnosis.settings import Settings
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import read_cases
 
 SETTINGS = Settings()
 BAD_ROW = 11
@@ -38,5 +38,5 @@ def test_an_error_that_the_measurements_of_a_pose_share_makes_no_gross_errors(
         error = joint_error[table["pose"], joint - 1]
         table[f"q{joint}"] = table[f"q{joint}"] + error
     folder = make_folder(tmp_path / "made", kuka, table=table)
-    case, _ = cases_in(folder, config_folder / "robots")
+    case, _ = read_cases(folder, config_folder / "robots")
     assert select_initial_subset(case, SETTINGS).kept.all()

@@ -9,6 +9,7 @@ from made_loop_tables import CAMPAIGNS, effect_entry
 
 from elastocal.diagnosis.diagnose import Diagnosis, Step
 from elastocal.diagnosis.judge import generate_residual_blocks, judge
+from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import get_joint_compliances
 from elastocal.fitting.noise import Noise
@@ -55,6 +56,7 @@ def diagnosis_of(case, steps):
         None,
         verdict,
         case.campaign.measurements.select(np.zeros(0, int)),
+        Settings(),
     )
 
 

@@ -12,8 +12,8 @@ from elastocal.diagnosis.misplaced import (
     find_misplaced_frames,
 )
 from elastocal.fitting.noise import estimate_noise, fit_declared_model
-from elastocal.loop.overview import overview
-from elastocal.loop.whole import cases_in
+from elastocal.loop.overview import inspect_campaign
+from elastocal.loop.whole import read_cases
 from elastocal.mechanics.kinematics import compute_poses
 from elastocal.mechanics.sites import build_sites
 
@@ -85,7 +85,7 @@ def misdeclared_folder(folder, robot, name, place, shift_m, seed=1):
 
 def find_in(folder):
     """Misplaced frames of a campaign."""
-    case, _ = cases_in(folder, ROBOTS)
+    case, _ = read_cases(folder, ROBOTS)
     noise, _ = estimate_noise(case)
     fitted = fit_declared_model(case.model, case.observations, noise)
     return find_misplaced_frames(fitted, case.campaign)
@@ -119,10 +119,10 @@ def test_a_wrong_target_or_length_is_found_with_its_size(
 def test_a_misplaced_base_or_target_is_reported_before_any_diagnosis(tmp_path, name):
     robot = analysed(name)
     base = misdeclared_folder(tmp_path / "base", robot, name, "base", [0, 5e-3, 0])
-    first = overview(base, ROBOTS).attention[0]
+    first = inspect_campaign(base, ROBOTS).attention[0]
     assert "base stands 5." in first or "base stands 4.9" in first
     tool = misdeclared_folder(tmp_path / "tool", robot, name, "tool", [5e-3, 0, 0])
-    sentences = overview(tool, ROBOTS).attention
+    sentences = inspect_campaign(tool, ROBOTS).attention
     assert "along x of" in sentences[0]
     assert not any("base stands" in sentence for sentence in sentences)
 
@@ -140,7 +140,7 @@ def test_the_reference_point_is_described_with_the_declared_offset_of_its_target
     tmp_path,
 ):
     folder = misdeclared_folder(tmp_path / "made", analysed("kuka"), "kuka", "", 0.0)
-    case, _ = cases_in(folder, ROBOTS)
+    case, _ = read_cases(folder, ROBOTS)
     sentence = describe_reference_point(case.campaign)
     assert "6DoF" in sentence
     assert "(100.0, 0.0, 50.0) mm" in sentence

@@ -49,7 +49,7 @@ def diagnosed(campaign, robot, keys):
     design = design_of(campaign, keys)
     posterior = search_models(design.problem)
     evidence = SimpleNamespace(
-        linearized=design,
+        design=design,
         posterior=posterior,
         alarm=RAISED,
         conclusion=conclude(design.problem, posterior, RAISED),

@@ -30,7 +30,7 @@ from elastocal.effects.catalogue import (
     declared_candidates,
     list_bundled_effects,
 )
-from elastocal.effects.conditions import with_total
+from elastocal.effects.conditions import replace_total_load
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import evaluate_conditions
 from elastocal.mechanics.kinematics import compute_poses
@@ -242,7 +242,7 @@ def test_laws_go_with_the_loads_of_no_other_coordinates_than_they_displace(chain
         displaced = sorted({coordinate for law in laws for coordinate in law})
         elsewhere = 2.0 * around.total + 1.0
         elsewhere[:, displaced] = around.total[:, displaced]
-        again = displacements(candidate, with_total(around, elsewhere), *start)
+        again = displacements(candidate, replace_total_load(around, elsewhere), *start)
         np.testing.assert_array_equal(
             again, displacements(candidate, around, *start), err_msg=candidate.key
         )

@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 from synthetic import make_states
 
-from elastocal.effects.conditions import offered, progress_of
+from elastocal.effects.conditions import compute_progress, find_offered_needs
 from elastocal.mechanics.sites import build_sites
 
 
 def test_progress_counts_rows_of_the_campaign_or_else_poses():
     states = make_states(6, 5, seed=16)
-    np.testing.assert_allclose(progress_of(states), np.arange(5) / 4)
+    np.testing.assert_allclose(compute_progress(states), np.arange(5) / 4)
     # Some of the rows of a longer campaign.
-    np.testing.assert_allclose(progress_of(states, (1, 21)), np.arange(5) / 20)
+    np.testing.assert_allclose(compute_progress(states, (1, 21)), np.arange(5) / 20)
     without = replace(states, row=None)
-    np.testing.assert_allclose(progress_of(without), np.arange(5) / 4)
+    np.testing.assert_allclose(compute_progress(without), np.arange(5) / 4)
     # What is to be measured comes after all rows.
-    np.testing.assert_array_equal(progress_of(without, (1, 21)), np.ones(5))
+    np.testing.assert_array_equal(compute_progress(without, (1, 21)), np.ones(5))
 
 
 @pytest.mark.parametrize(
@@ -28,6 +28,10 @@ def test_progress_counts_rows_of_the_campaign_or_else_poses():
 def test_time_and_temperature_are_there_where_they_change(kuka, column, name):
     sites = build_sites(kuka)
     states = make_states(6, 5, seed=1)
-    assert name in offered(sites, replace(states, **{column: np.arange(5.0)}))
-    assert name not in offered(sites, replace(states, **{column: np.full(5, 20.0)}))
-    assert name not in offered(sites, replace(states, **{column: None}))
+    assert name in find_offered_needs(
+        sites, replace(states, **{column: np.arange(5.0)})
+    )
+    assert name not in find_offered_needs(
+        sites, replace(states, **{column: np.full(5, 20.0)})
+    )
+    assert name not in find_offered_needs(sites, replace(states, **{column: None}))

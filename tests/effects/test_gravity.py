@@ -20,7 +20,7 @@ from synthetic import (
 )
 
 from elastocal.effects.catalogue import candidates_on
-from elastocal.effects.conditions import conditions_of, offered
+from elastocal.effects.conditions import build_conditions, find_offered_needs
 from elastocal.effects.gravity import declared_weight, lever_of_pull
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import (
@@ -261,10 +261,12 @@ def test_structure_bears_the_usual_weight_where_neither_masses_nor_loads_are_kno
     potential energy."""
     states = make_states(6, 4, seed=7)
     states.wrench[:] = 0.0
-    sites = replace(build_sites(replace(fanuc, payload_kg=100.0)), bears_typical_weight=True)
-    around = conditions_of(sites, fanuc.compliance, states)
-    assert sites.typical_masses_kg.sum() == pytest.approx(600.0)
-    assert offered(sites, states) & {"load", "load on the joints"} == {"load"}
+    sites = replace(build_sites(replace(fanuc, payload_kg=100.0)), usual_weight=True)
+    around = build_conditions(sites, fanuc.compliance, states)
+    assert sites.usual_masses.sum() == pytest.approx(600.0)
+    assert find_offered_needs(sites, states) & {"load", "load on the joints"} == {
+        "load"
+    }
 
     def energy(coordinates):
         ends = compute_motion(sites.chain, coordinates, sites.tracked_points).position[

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from support import refused
 
 from elastocal.exchange.dh import DhOptions, robot_from_dh
-from elastocal.exchange.robot_text import robot_text
+from elastocal.exchange.robot_text import format_robot_file
 from elastocal.mechanics.kinematics import compute_poses
 from elastocal.mechanics.robot_file import parse_robot
 
@@ -39,7 +39,7 @@ def screw(letter, turn, shift):
 
 
 def assert_stands(result, rows, modified):
-    robot = parse_robot(yaml.safe_load(robot_text(result)))
+    robot = parse_robot(yaml.safe_load(format_robot_file(result)))
     for angles in np.random.default_rng(1).uniform(-2, 2, (4, robot.joints)):
         at = pin.SE3.Identity()
         values = iter(angles)
@@ -67,7 +67,9 @@ tables = st.lists(st.tuples(angle, length, length, angle), min_size=1, max_size=
 @given(rows=tables, modified=st.booleans())
 def test_any_table_is_where_its_notation_puts_it(tmp_path_factory, rows, modified):
     assert_stands(
-        robot_from_dh(write(tmp_path_factory.mktemp("dh"), rows), modified, RADIANS),
+        robot_from_dh(
+            write(tmp_path_factory.mktemp("dh"), rows), RADIANS, modified=modified
+        ),
         rows,
         modified,
     )
@@ -93,7 +95,7 @@ def test_lengths_that_cancel_along_nearly_parallel_axes_become_short_ones(
     rows = [[*row] for row in UR5_CALIBRATED]
     for number, d in enumerate((lever, -lever - 0.1, 0.2) if lever else (), 1):
         rows[number][1] = d
-    result = robot_from_dh(write(tmp_path, rows), modified, RADIANS)
+    result = robot_from_dh(write(tmp_path, rows), RADIANS, modified=modified)
     robot = assert_stands(result, rows, modified)
     assert sum(abs(t.constant) for t in robot.chain.transforms if t.kind == "T") < 2.5
     assert any("cancel" in note for note in result.notes)
@@ -226,7 +228,7 @@ def test_a_calibrated_arm_is_where_its_origins_put_it(tmp_path, order):
         "calib.yaml",
     )
     result = robot_from_dh(path, name="ur5")
-    robot = parse_robot(yaml.safe_load(robot_text(result)))
+    robot = parse_robot(yaml.safe_load(format_robot_file(result)))
     wrist = "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"
     assert robot.joint_names == (
         "shoulder_pan_joint",

@@ -11,9 +11,9 @@ from support import refused
 
 from elastocal.exchange.robot_text import (
     check_imported,
-    displacement_words,
+    format_displacement,
+    format_robot_file,
     refuse_existing,
-    robot_text,
     write_robot,
 )
 from elastocal.mechanics.chain import parse_chain
@@ -43,8 +43,8 @@ def result(tmp_path):
 def test_the_text_gives_back_the_document_under_a_head_whatever_the_file_is_called(
     tmp_path, result
 ):
-    lines = robot_text(result).splitlines()
-    assert yaml.safe_load(robot_text(result)) == DOCUMENT
+    lines = format_robot_file(result).splitlines()
+    assert yaml.safe_load(format_robot_file(result)) == DOCUMENT
     assert (
         lines[0] == "# From x.urdf (sha256 3fc9b689459d738f), by hand."
         and "# Masses are guessed." in lines
@@ -56,14 +56,14 @@ def test_the_text_gives_back_the_document_under_a_head_whatever_the_file_is_call
     path = tmp_path / "x\u2028payload_kg: 9"
     path.write_text("")
     assert (
-        yaml.safe_load(robot_text(check_imported(DOCUMENT, path, "by hand", ())))
+        yaml.safe_load(format_robot_file(check_imported(DOCUMENT, path, "by hand", ())))
         == DOCUMENT
     )
 
 
 def test_nothing_is_replaced_unless_it_shall_be(tmp_path, result):
     path = tmp_path / "robot.yaml"
-    refuse_existing(path, False)
+    refuse_existing(path, force=False)
     write_robot(result, path)
     assert yaml.safe_load(path.read_text()) == DOCUMENT
     with refused(path, "chain", "metres"):
@@ -71,11 +71,11 @@ def test_nothing_is_replaced_unless_it_shall_be(tmp_path, result):
             DOCUMENT | {"chain": "Tz(500) Rz(q1) Tz(q2) [flange]"}, path, "by hand", ()
         )
     with refused(path, "", "already", "--force"):
-        refuse_existing(path, False)
-    refuse_existing(path, True)
+        refuse_existing(path, force=False)
+    refuse_existing(path, force=True)
     for place in (tmp_path, tmp_path / "none" / "robot.yaml"):
         with refused(place, "", "no place"):
-            refuse_existing(place, True)
+            refuse_existing(place, force=True)
 
 
 angles = st.one_of(
@@ -90,7 +90,7 @@ def test_a_displacement_is_what_its_words_make(roll, pitch, yaw, shift):
     transform[:3, :3] = pin.rpy.rpyToMatrix(roll, pitch, yaw)
     transform[:3, 3] = shift
     chain = parse_chain(
-        " ".join(["Rz(q1)", *displacement_words(transform), "[E]"]), {}, "x"
+        " ".join(["Rz(q1)", *format_displacement(transform), "[E]"]), {}, "x"
     )
     position, rotation = compute_poses(chain, np.zeros((1, 1)), chain.end_effector)
     np.testing.assert_allclose(position[0], shift, rtol=0, atol=1e-11)

@@ -6,7 +6,7 @@ from analysed_robots import analysed
 from scipy.spatial.transform import Rotation
 from support import refused
 
-from elastocal.exchange.target_path import read_target_path, read_target_path_of
+from elastocal.exchange.target_path import read_target_path, read_target_path_for
 
 HEADER = "x,y,z,rx,ry,rz"
 ROWS = ["1.0,0.2,0.5,0.1,0.2,0.3", "1.1,0.2,0.5,0.0,0.0,0.0"]
@@ -91,9 +91,9 @@ def test_joint_angles_in_degrees_are_refused_as_such(tmp_path):
         [ROWS[0] + ",0.5,-1.2,1.4,0,0.6,0", ROWS[1] + ",45,-60,90,0,30,0"],
     )
     with refused(path, "line 3", "q1 looks like degrees: 45; allowed: rad"):
-        read_target_path_of(path, analysed("kuka"))
+        read_target_path_for(path, analysed("kuka"))
     assert (
-        read_target_path_of(
+        read_target_path_for(
             write_path(tmp_path, header, [ROWS[0] + ",3.3,-1.2,1.4,0,0.6,0"]),
             analysed("kuka"),
         ).start[0, 0]

@@ -8,9 +8,9 @@ from made_urdf import Pinocchio, assert_same_poses, joint, link, robot, written
 from support import refused
 from synthetic import make_states
 
-from elastocal.effects.conditions import conditions_of
+from elastocal.effects.conditions import build_conditions
 from elastocal.exchange import urdf
-from elastocal.exchange.robot_text import robot_text
+from elastocal.exchange.robot_text import format_robot_file
 from elastocal.exchange.urdf import read_urdf, robot_from_urdf
 from elastocal.io.documents import check_document
 from elastocal.mechanics.robot_file import parse_robot
@@ -68,7 +68,7 @@ ARM = (
 
 def through_its_file(result):
     """The arm of the text that is written, not of the document in memory."""
-    document = yaml.safe_load(robot_text(result))
+    document = yaml.safe_load(format_robot_file(result))
     check_document(document, "robot", "robot.yaml")
     return parse_robot(document)
 
@@ -76,7 +76,7 @@ def through_its_file(result):
 def assert_same_weight(arm, path, within=None):
     states = make_states(arm.joints, 6, seed=3)
     by_pinocchio = Pinocchio(path)
-    own = conditions_of(build_sites(arm), arm.compliance, states).gravity[
+    own = build_conditions(build_sites(arm), arm.compliance, states).gravity[
         :, : arm.joints
     ]
     for angles, torque in zip(states.joint_angles, own, strict=True):

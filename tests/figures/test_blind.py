@@ -7,10 +7,10 @@ from drawn_figures import legend_entries, row_labels, texts_in_axes
 
 from elastocal_proof.blind.closed_loop import MODELS, PARTS
 from elastocal_proof.figures.blind import (
-    closed_loop,
-    power_map,
-    rates_and_targets,
-    reliability_diagram,
+    draw_correction_errors,
+    draw_power,
+    draw_reliability,
+    draw_targets,
 )
 
 
@@ -44,7 +44,7 @@ def test_targets_have_a_dot_with_its_interval_and_the_range_of_the_target():
             "target": None,
         }
     )
-    rates, ratios = rates_and_targets(pd.DataFrame(rows)).axes
+    rates, ratios = draw_targets(pd.DataFrame(rows)).axes
     assert row_labels(rates) == ["detected at 50"] and len(row_labels(ratios)) == 1
     assert [list(line.get_xdata()) for line in rates.lines] == [[85.0, 94.0], [90.0]]
     assert rates.patches[0].get_x() == pytest.approx(97.0) and rates.patches[
@@ -76,7 +76,7 @@ def test_power_map_has_a_share_for_each_effect_and_level_and_marks_what_is_absor
         power_rows("force_scale", level, 0.0, "raw") for level in (50.0, 200.0)
     ] + [power_rows("lost_motion", 200.0, 0.7)]
     rows += [power_rows("all", 50.0, 0.7)]
-    figure = power_map(pd.DataFrame(rows))
+    figure = draw_power(pd.DataFrame(rows))
     assert row_labels(figure.axes[0]) == [
         "payload",
         "lost motion",
@@ -91,7 +91,7 @@ def test_power_map_has_a_share_for_each_effect_and_level_and_marks_what_is_absor
     )
     assert (
         "no case"
-        in texts_in_axes(power_map(pd.DataFrame(rows).query("group == 'none'")))[0]
+        in texts_in_axes(draw_power(pd.DataFrame(rows).query("group == 'none'")))[0]
     )
 
 
@@ -104,7 +104,7 @@ def test_the_reliability_diagram_shows_observed_against_stated_shares_and_number
     table = pd.DataFrame(
         rows, columns=["group", "from", "to", "stated", "rate", "low", "high", "cases"]
     )
-    shares, counts = reliability_diagram(table).axes
+    shares, counts = draw_reliability(table).axes
     drawn = [
         container.lines[0].get_xydata().tolist() for container in shares.containers
     ]
@@ -112,7 +112,7 @@ def test_the_reliability_diagram_shows_observed_against_stated_shares_and_number
     ends = [path.vertices[:, 1].tolist() for path in shares.collections[0].get_paths()]
     assert ends == [pytest.approx([0.9, 0.99]), pytest.approx([0.0, 0.8])]
     assert [patch.get_height() for patch in counts.patches] == [100, 4]
-    assert "No verdict" in texts_in_axes(reliability_diagram(table.iloc[:0]))[0]
+    assert "No verdict" in texts_in_axes(draw_reliability(table.iloc[:0]))[0]
 
 
 def test_every_error_is_drawn_where_its_model_stands():
@@ -129,7 +129,7 @@ def test_every_error_is_drawn_where_its_model_stands():
         for task in PARTS
         for number, model in enumerate(MODELS)
     ]
-    figure = closed_loop(
+    figure = draw_correction_errors(
         pd.DataFrame(rows), {"gp180": "Yaskawa GP180", "kuka": "KUKA KR 270"}
     )
     assert [axis.get_title() for axis in figure.axes] == [

@@ -5,9 +5,9 @@ import pytest
 from drawn_figures import legend_entries, row_labels
 from made_leagues import make_results
 
-from elastocal_proof.figures.league import league_picture, mechanism_picture
+from elastocal_proof.figures.league import draw_mechanisms, draw_method_errors
 from elastocal_proof.league.methods import Method
-from elastocal_proof.league.table import league_table
+from elastocal_proof.league.table import compare_methods
 
 METHODS = {
     name: Method("geometry", words=f"{name} in words")
@@ -17,13 +17,13 @@ METHODS = {
 
 @pytest.fixture(scope="module")
 def table():
-    return league_table(
+    return compare_methods(
         make_results(), {"A robot": ["one"], "Another": ["two"]}, "geometry", 1
     )
 
 
 def test_each_split_has_a_panel_and_each_method_a_mark_in_the_legend(table):
-    figure = league_picture(table, METHODS)
+    figure = draw_method_errors(table, METHODS)
     assert [axis.get_title() for axis in figure.axes] == [
         "random poses",
         "blocks of joint space",
@@ -31,7 +31,7 @@ def test_each_split_has_a_panel_and_each_method_a_mark_in_the_legend(table):
     ]
     assert legend_entries(figure) == [f"{name} in words" for name in METHODS]
     assert row_labels(figure.axes[0]) == ["one\n30 poses", "two\n40 poses"]
-    assert len(league_picture(table[table["split"] == "blocks"], METHODS).axes) == 1
+    assert len(draw_method_errors(table[table["split"] == "blocks"], METHODS).axes) == 1
 
 
 def mechanisms(probability):
@@ -45,11 +45,9 @@ def mechanisms(probability):
 
 
 def test_mechanisms_that_are_nowhere_probable_are_left_out():
-    figure = mechanism_picture(mechanisms(0.9))
+    figure = draw_mechanisms(mechanisms(0.9))
     labels = row_labels(figure.axes[0])
     assert len(labels) == 1 and "40 %" in [
         text.get_text() for text in figure.axes[0].texts
     ]
-    assert (
-        "No data set" in mechanism_picture(mechanisms(0.3)).axes[0].texts[0].get_text()
-    )
+    assert "No data set" in draw_mechanisms(mechanisms(0.3)).axes[0].texts[0].get_text()

@@ -1,4 +1,4 @@
-"""Fixtures of the tests of the model."""
+"""Fixtures of the tests of fitting."""
 
 import pytest
 from synthetic import make_estimate, make_model, make_states, observe_exactly
@@ -15,10 +15,10 @@ TARGETS = (
 
 @pytest.fixture(params=[3, 6], ids=["positions", "poses"])
 def full_case(request, fanuc):
-    """Two sessions, three targets, two effects and springs that are identified; every
-    parameter somewhere."""
-    known = candidates_on(make_model(fanuc.chain).sites)
-    effects = known["lost_motion@2"], known["link_geometry@3"]
+    """A model with every kind of parameter, an estimate and exact observations: two
+    sessions, three targets, two effects and identified joint compliances."""
+    candidates = candidates_on(make_model(fanuc.chain).sites)
+    effects = candidates["lost_motion@2"], candidates["link_geometry@3"]
     model = make_model(
         fanuc.chain, TARGETS, request.param, effects=effects, identified=True
     )

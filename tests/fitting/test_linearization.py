@@ -1,5 +1,5 @@
-"""Sensitivities by central differences of exact residuals; products of columns in two
-factors as of those written out."""
+"""Sensitivities are central differences of exact residuals, and products of factored
+sensitivities are those of the dense matrix."""
 
 from dataclasses import replace
 from unittest import mock
@@ -26,27 +26,40 @@ from elastocal.fitting.linearization import FactoredSensitivities, linearize
 from elastocal.fitting.model import evaluate_conditions, list_parameters
 
 
-def made(seed, states=5, observations=17, rows=3, coordinates=4, columns=6):
-    """Columns that displace none to three coordinates, and their laws; in every state
-    one observation at least."""
+def make_factored(seed, states=5, observations=17, rows=3, coordinates=4, columns=6):
+    """Make factored sensitivities whose columns displace none to three coordinates;
+    every state has at least one observation.
+
+    Returns
+    -------
+    FactoredSensitivities
+    displacements : list of dict
+        Of each column, the displacement of each coordinate, (states,).
+    sizes : ndarray (columns,)
+        Plausible sizes of the parameters.
+    """
     rng = np.random.default_rng(seed)
     state = rng.permutation(
         np.concatenate(
             [np.arange(states), rng.integers(0, states, observations - states)]
         )
     )
-    chosen = [
-        rng.choice(coordinates, rng.integers(0, min(coordinates, 3) + 1), replace=False)
+    most = min(coordinates, 3)
+    coordinates_of_columns = [
+        rng.choice(coordinates, rng.integers(0, most + 1), replace=False)
         for _ in range(columns)
     ]
-    laws = [{int(c): rng.standard_normal(states) for c in some} for some in chosen]
+    displacements = []
+    for chosen in coordinates_of_columns:
+        displacements.append({int(c): rng.standard_normal(states) for c in chosen})
     sizes = rng.uniform(0.5, 2.0, columns)
     jacobian = rng.standard_normal((observations, rows, coordinates))
-    return FactoredSensitivities.of(laws, jacobian, state, states, sizes), laws, sizes
+    factored = FactoredSensitivities.of(displacements, jacobian, state, states, sizes)
+    return factored, displacements, sizes
 
 
-MADE = st.builds(
-    made,
+FACTORED = st.builds(
+    make_factored,
     st.integers(0, 10**6),
     states=st.integers(1, 6),
     observations=st.integers(6, 20),
@@ -56,85 +69,99 @@ MADE = st.builds(
 )
 
 
-@settings(deadline=None)
-@given(MADE, st.sampled_from([1, 20, 10**6]))
-def test_products_are_those_of_the_columns_written_out_however_many_states_are_taken_at_once(
-    given_columns, at_once
-):
-    columns, laws, sizes = given_columns
-    dense = np.zeros((*columns.jacobian.shape[:2], len(laws)))
-    for number, law in enumerate(laws):
-        for coordinate, values in law.items():
+def write_out(factored, displacements, sizes):
+    """Write out the dense sensitivities, column by column."""
+    dense = np.zeros((*factored.jacobian.shape[:2], len(displacements)))
+    for number, displacement in enumerate(displacements):
+        for coordinate, values in displacement.items():
             dense[..., number] += (
                 sizes[number]
-                * columns.jacobian[..., coordinate]
-                * values[columns.state, None]
+                * factored.jacobian[..., coordinate]
+                * values[factored.state, None]
             )
-    np.testing.assert_allclose(columns.dense(), dense, atol=1e-12)
+    return dense
+
+
+@settings(deadline=None)
+@given(FACTORED, st.sampled_from([1, 20, 10**6]))
+def test_products_are_those_of_the_dense_sensitivities_for_any_block_size(
+    factored_case, block_size
+):
+    factored, displacements, sizes = factored_case
+    dense = write_out(factored, displacements, sizes)
+    np.testing.assert_allclose(factored.dense(), dense, atol=1e-12)
     np.testing.assert_allclose(
-        columns.select_columns(sizes > 1.2).dense(), dense[..., sizes > 1.2], atol=1e-12
+        factored.select_columns(sizes > 1.2).dense(),
+        dense[..., sizes > 1.2],
+        atol=1e-12,
     )
     np.testing.assert_allclose(
-        columns.at(columns.state > 0).dense(), dense[columns.state > 0], atol=1e-12
+        factored.at(factored.state > 0).dense(), dense[factored.state > 0], atol=1e-12
     )
-    right = np.random.default_rng(1).standard_normal((*dense.shape[:2], 2))
-    # States of one pose one after the other, not all poses of one size.
-    pose = columns.state // 2
-    with mock.patch.object(linearization, "_AT_ONCE", at_once):
-        gram = columns.gram()
-        products = columns.times(right)
-        of_poses = columns.multiply_by_pose(right, pose)
+    vectors = np.random.default_rng(1).standard_normal((*dense.shape[:2], 2))
+    # The states of a pose follow each other, and poses differ in their size.
+    pose = factored.state // 2
+    with mock.patch.object(linearization, "_AT_ONCE", block_size):
+        gram = factored.gram()
+        products = factored.times(vectors)
+        products_by_pose = factored.multiply_by_pose(vectors, pose)
     np.testing.assert_allclose(
         gram, np.tensordot(dense, dense, ((0, 1), (0, 1))), atol=1e-10
     )
     np.testing.assert_allclose(
-        products, np.tensordot(dense, right, ((0, 1), (0, 1))), atol=1e-10
+        products, np.tensordot(dense, vectors, ((0, 1), (0, 1))), atol=1e-10
     )
     expected = [
-        np.einsum("mrk,mrn->nk", dense[pose == p], right[pose == p])
-        for p in range(pose.max() + 1)
+        np.einsum("mrk,mrn->nk", dense[pose == number], vectors[pose == number])
+        for number in range(pose.max() + 1)
     ]
-    np.testing.assert_allclose(of_poses, expected, atol=1e-10)
+    np.testing.assert_allclose(products_by_pose, expected, atol=1e-10)
 
 
 @pytest.mark.parametrize("size", [1.0, 1e6])
-def test_what_two_columns_have_in_common_is_known_to_the_rounding_of_their_squares(
+def test_the_gram_matrix_resolves_a_small_difference_of_two_columns(
     size,
 ):
-    """A column and one that is a thousandth off it."""
+    """The second column differs from the first by a thousandth. The squared norm of
+    the difference follows from the Gram matrix up to the rounding of its entries."""
     rng = np.random.default_rng(4)
-    law = size * rng.standard_normal(30)
-    off = 1e-3 * size * rng.standard_normal(30)
+    displacement = size * rng.standard_normal(30)
+    difference = 1e-3 * size * rng.standard_normal(30)
     jacobian = rng.standard_normal((30, 3, 2))
     gram = FactoredSensitivities.of(
-        [{0: law}, {0: law, 1: off}], jacobian, np.arange(30), 30
+        [{0: displacement}, {0: displacement, 1: difference}],
+        jacobian,
+        np.arange(30),
+        30,
     ).gram()
-    rest = gram[1, 1] - 2 * gram[0, 1] + gram[0, 0]
-    assert rest == pytest.approx(
-        (off**2 * (jacobian[..., 1] ** 2).sum(axis=1)).sum(), rel=1e-8
+    squared_norm = gram[1, 1] - 2 * gram[0, 1] + gram[0, 0]
+    assert squared_norm == pytest.approx(
+        (difference**2 * (jacobian[..., 1] ** 2).sum(axis=1)).sum(), rel=1e-8
     )
 
 
-def assert_slopes(model, estimate, seen, shape):
-    """Sensitivities are central differences of the residuals; every parameter is
-    seen."""
-    around = evaluate_conditions(model, estimate, seen.states)
+def assert_slopes(model, estimate, observations, shape):
+    """Check that sensitivities are central differences of the residuals, and that
+    every parameter has an effect."""
+    conditions = evaluate_conditions(model, estimate, observations.states)
     steps = np.diag(small_steps(model, estimate))
-    expected = slopes(model, estimate, seen, around, steps)
-    found = linearize(model, estimate, seen, around).sensitivities @ steps
+    expected = slopes(model, estimate, observations, conditions, steps)
+    linearized = linearize(model, estimate, observations, conditions)
+    sensitivities = linearized.sensitivities @ steps
     largest = np.abs(expected).max(axis=(0, 1))
-    assert (
-        found.shape == expected.shape == (*shape, len(list_parameters(model, estimate)))
-        and (largest > 0).all()
+    assert expected.shape == (*shape, len(list_parameters(model, estimate)))
+    assert sensitivities.shape == expected.shape
+    assert (largest > 0).all()
+    np.testing.assert_allclose(
+        sensitivities / largest, expected / largest, rtol=0, atol=1e-5
     )
-    np.testing.assert_allclose(found / largest, expected / largest, rtol=0, atol=1e-5)
 
 
 def test_sensitivities_are_central_differences_of_the_residuals(full_case):
     assert_slopes(*full_case, (24, full_case[0].rows))
 
 
-def test_a_mount_of_unknown_turn_and_a_known_one_at_an_unknown_place_have_their_sensitivities(
+def test_mounts_with_an_unknown_rotation_or_an_unknown_offset_have_sensitivities(
     fanuc,
 ):
     targets = (
@@ -147,19 +174,17 @@ def test_a_mount_of_unknown_turn_and_a_known_one_at_an_unknown_place_have_their_
     assert_slopes(model, estimate, observe_exactly(model, estimate, states), (16, 6))
 
 
-def test_the_place_of_a_jump_has_no_slope_where_a_row_is_within_a_step_of_it(fanuc):
+def test_the_instant_of_a_jump_has_no_slope_if_a_row_is_within_a_step_of_it(fanuc):
     model = make_model(fanuc.chain, effects=[find_candidate(fanuc.chain, "setup_step")])
     states = make_states(6, 9, seed=3)
-    seen = observe_exactly(model, make_estimate(model, seed=4), states)
-    # A row at a half lies on the other side of the jump a step further on.
+    observations = observe_exactly(model, make_estimate(model, seed=4), states)
+    # A step further, the row at a half lies on the other side of the jump.
     estimate = replace(make_estimate(model, seed=5), shapes=(np.array([0.5 - 1e-6]),))
-    line = linearize(
-        model, estimate, seen, evaluate_conditions(model, estimate, states)
-    )
-    assert not line.sensitivities[..., -1].any() and line.sensitivities[..., -2].any()
-    found = fit_model(model, seen, NOISE, estimate)
-    assert (
-        found.unidentifiable[-1]
-        and found.estimate.shapes[0] == estimate.shapes[0]
-        and found.converged
-    )
+    conditions = evaluate_conditions(model, estimate, states)
+    linearized = linearize(model, estimate, observations, conditions)
+    assert not linearized.sensitivities[..., -1].any()
+    assert linearized.sensitivities[..., -2].any()
+    fit = fit_model(model, observations, NOISE, estimate)
+    assert fit.unidentifiable[-1]
+    assert fit.estimate.shapes[0] == estimate.shapes[0]
+    assert fit.converged

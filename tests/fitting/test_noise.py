@@ -1,8 +1,8 @@
-"""Noise from repeats: what was put in comes out, within what so many repeats can tell;
-else what the declared model leaves.
+"""Noise estimated from repeats is the simulated noise, within what so many repeats can
+show; without repeats it comes from the residual of the declared model.
 
-Declared geometry has one prior, whose size the measurements make most probable; and
-what priors leave of parameters.
+The declared geometry has one prior, whose scale maximizes the evidence, and effective
+parameters are counted.
 """
 
 from dataclasses import replace
@@ -46,8 +46,9 @@ SENSOR_M = 50e-6
 SENSOR_RAD = 30e-6
 
 
-def campaign(robot, **noise):
-    nothing = drawn(robot, 0, poses=1, repeats=1)[2]
+def declare_campaign(robot, **noise):
+    """Make a campaign with a declared noise, and measurements of a single pose."""
+    measurements = simulate_repeats(robot, 0, poses=1, repeats=1)[2]
     return Campaign(
         "c",
         robot,
@@ -58,11 +59,17 @@ def campaign(robot, **noise):
         (),
         noise or None,
         {},
-        nothing,
+        measurements,
     )
 
 
-def drawn(robot, seed, poses=20, repeats=5, joint_rad=0.0, rows=3, targets=TARGETS):
+def simulate_repeats(
+    robot, seed, poses=20, repeats=5, joint_rad=0.0, rows=3, targets=TARGETS
+):
+    """Simulate repeated measurements of a known robot.
+
+    Returns the model, its estimate and the measurements.
+    """
     model = make_model(
         robot.chain, targets, rows, fitted_frames=False, compliance=robot.compliance
     )
@@ -74,249 +81,287 @@ def drawn(robot, seed, poses=20, repeats=5, joint_rad=0.0, rows=3, targets=TARGE
 
 
 def test_uncertainties_of_measurements_are_the_declared_noise(fanuc):
-    stated = campaign(fanuc)
+    campaign = declare_campaign(fanuc)
     u95 = 1.959964 * np.array([3e-5, 4e-5, 5e-5])
-    stated = replace(stated, measurements=replace(stated.measurements, u95_m=u95))
-    found = choose_noise(stated, *drawn(fanuc, 0, poses=1, repeats=1)[:2])[0]
-    assert found.position_m == pytest.approx(1e-5 * np.sqrt(50 / 3))
+    campaign = replace(campaign, measurements=replace(campaign.measurements, u95_m=u95))
+    model, estimate, _ = simulate_repeats(fanuc, 0, poses=1, repeats=1)
+    noise = choose_noise(campaign, model, estimate)[0]
+    assert noise.position_m == pytest.approx(1e-5 * np.sqrt(50 / 3))
 
 
 HANDS = tuple(Target(name, "hand", (0.0, 0.0, 0.0)) for name in "AB")
 
 
-def off_by(model, off, turned=None):
-    """Repeats that are off the model by exactly so much: ndarray (poses, repeats,
-    targets, 3), m and rad."""
+def measure_with_errors(model, error, rotation_vector=None):
+    """Make repeats whose errors are known.
+
+    Parameters
+    ----------
+    model
+        Model that the measurements deviate from.
+    error : ndarray (poses, repeats, targets, 3)
+        Position errors, m.
+    rotation_vector : ndarray of the same shape, optional
+        Orientation errors, rad.
+    """
     exact = make_measurements(
-        model, np.random.default_rng(20), *off.shape[:2], 0.0, 0.0
+        model, np.random.default_rng(20), *error.shape[:2], 0.0, 0.0
     )
-    moved = replace(exact, position=exact.position + off.reshape(-1, 3))
-    if turned is None:
-        return moved
-    vectors = Rotation.from_rotvec(turned.reshape(-1, 3)) * Rotation.from_rotvec(
-        exact.rotation_vector
-    )
-    return replace(moved, rotation_vector=vectors.as_rotvec())
+    measured = replace(exact, position=exact.position + error.reshape(-1, 3))
+    if rotation_vector is None:
+        return measured
+    rotation = Rotation.from_rotvec(
+        rotation_vector.reshape(-1, 3)
+    ) * Rotation.from_rotvec(exact.rotation_vector)
+    return replace(measured, rotation_vector=rotation.as_rotvec())
 
 
-def mirrored(parts):
-    """Two repeats either side of the middle, whose contrasts are exactly `parts`,
+def make_symmetric_repeats(contrasts):
+    """Make two repeats on either side of their mean, whose contrasts are given exactly:
     ndarray (poses, targets, 3)."""
-    return np.stack([-parts, parts], axis=1) / np.sqrt(2)
+    return np.stack([-contrasts, contrasts], axis=1) / np.sqrt(2)
 
 
-def gantry(text="Tx(q1) [hand]", targets=1, rows=3):
-    """A model whose joints shift or turn all targets alike in every pose, so that the
+def make_gantry(text="Tx(q1) [hand]", targets=1, rows=3):
+    """Make a model whose joints shift all targets alike in every pose, so that the
     likelihood has a closed form."""
     model = make_model(chain_of(text), HANDS[:targets], rows, fitted_frames=False)
     return model, make_estimate(model)
 
 
-def safe_side(approaches):
-    """By how much the joint part is taken larger than it seems: so that it is large
-    enough four times of five."""
+def compute_safety_factor(approaches):
+    """Factor by which the joint noise is reported above its estimate, so that it is
+    large enough in four of five campaigns."""
     return np.sqrt(approaches / chi2.ppf(0.2, approaches))
 
 
+def sum_squares_about_means(errors, repeats, targets):
+    """Sum the squares about the mean of each pose and target, for the first repeats and
+    targets of each pose."""
+    total = 0.0
+    for pose, (repeat_count, target_count) in enumerate(
+        zip(repeats, targets, strict=True)
+    ):
+        of_pose = errors[pose, :repeat_count, :target_count]
+        total += ((of_pose - of_pose.mean(axis=0)) ** 2).sum()
+    return total
+
+
 @pytest.mark.parametrize("rows", [3, 6])
-def test_few_repeats_have_the_pooled_standard_deviation_of_states_with_different_numbers_of_them(
+def test_noise_of_few_repeats_is_the_pooled_standard_deviation(
     rows,
 ):
-    """Squares about the mean of each state and target over their degrees of freedom,
-    positions and orientations apart."""
-    model, estimate = gantry("Tz(0.4) Rz(q1) Tx(0.7) Ry(q2) Tx(0.6) [hand]", 2, rows)
+    """States have different numbers of repeats. The squares about the mean of each
+    state and target are divided by their degrees of freedom, separately for positions
+    and orientations."""
+    model, estimate = make_gantry(
+        "Tz(0.4) Rz(q1) Tx(0.7) Ry(q2) Tx(0.6) [hand]", 2, rows
+    )
     rng = np.random.default_rng(21)
-    off = SENSOR_M * rng.standard_normal((3, 4, 2, 3))
-    turned = SENSOR_RAD * rng.standard_normal((3, 4, 2, 3))
-    measurements = off_by(model, off, turned if rows == 6 else None)
-    # Pose 0 has two repeats of one target, pose 1 three of both and one of the first
-    # alone, which tells nothing, pose 2 four.
+    position_errors = SENSOR_M * rng.standard_normal((3, 4, 2, 3))
+    rotation_errors = SENSOR_RAD * rng.standard_normal((3, 4, 2, 3))
+    measurements = measure_with_errors(
+        model, position_errors, rotation_errors if rows == 6 else None
+    )
+    # Pose 0 has two repeats of one target and pose 2 has four. Pose 1 has three of both
+    # targets and a fourth of the first target alone, which carries no information.
     repeats = np.array([2, 3, 4])
     targets = np.array([1, 2, 1])
-    there = (measurements.repeat < repeats[measurements.pose]) & (
+    complete = (measurements.repeat < repeats[measurements.pose]) & (
         measurements.target < targets[measurements.pose]
     )
-    alone = (
+    single = (
         (measurements.pose == 1)
         & (measurements.repeat == 3)
         & (measurements.target == 0)
     )
-    found = estimate_noise_from_repeats(
-        model, estimate, measurements.select(there | alone)
+    noise = estimate_noise_from_repeats(
+        model, estimate, measurements.select(complete | single)
     )
-    parts = [
-        values[pose, : repeats[pose], : targets[pose]]
-        for values in (off, turned)
-        for pose in range(3)
-    ]
-    squares = [((part - part.mean(axis=0)) ** 2).sum() for part in parts]
     freedom = 3 * ((repeats - 1) * targets).sum()
-    assert found.degrees_of_freedom == freedom * rows // 3
-    assert found.position_m == pytest.approx(
-        np.sqrt(sum(squares[:3]) / freedom), rel=1e-6
-    )
-    expected = found.position_m if rows == 3 else np.sqrt(sum(squares[3:]) / freedom)
-    assert found.orientation_rad == pytest.approx(expected, rel=1e-6)
+    assert noise.degrees_of_freedom == freedom * rows // 3
+    squares = sum_squares_about_means(position_errors, repeats, targets)
+    assert noise.position_m == pytest.approx(np.sqrt(squares / freedom), rel=1e-6)
+    expected = noise.position_m
+    if rows == 6:
+        squares = sum_squares_about_means(rotation_errors, repeats, targets)
+        expected = np.sqrt(squares / freedom)
+    assert noise.orientation_rad == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize("rows", [3, 6])
-def test_a_joint_that_shifts_all_targets_has_the_maximum_of_its_likelihood_in_closed_form(
+def test_noise_of_a_joint_that_shifts_all_targets_is_the_maximum_of_its_likelihood(
     rows,
 ):
-    """What two targets make along the joint together has variance 2 s^2 + sigma^2,
-    every other direction sigma^2."""
-    model, estimate = gantry(targets=2, rows=rows)
+    """In closed form: the mean of two targets along the joint has the variance
+    2 s^2 + sigma^2, and every other direction has the variance sigma^2."""
+    model, estimate = make_gantry(targets=2, rows=rows)
     rng = np.random.default_rng(23)
-    parts = SENSOR_M * rng.standard_normal((40, 2, 3))
-    parts[..., 0] += 80e-6 * rng.standard_normal((40, 1))
-    turns = SENSOR_RAD * rng.standard_normal((40, 2, 3))
-    found = estimate_noise_from_repeats(
+    contrasts = SENSOR_M * rng.standard_normal((40, 2, 3))
+    contrasts[..., 0] += 80e-6 * rng.standard_normal((40, 1))
+    rotation_contrasts = SENSOR_RAD * rng.standard_normal((40, 2, 3))
+    rotation_errors = make_symmetric_repeats(rotation_contrasts) if rows == 6 else None
+    noise = estimate_noise_from_repeats(
         model,
         estimate,
-        off_by(model, mirrored(parts), mirrored(turns) if rows == 6 else None),
+        measure_with_errors(model, make_symmetric_repeats(contrasts), rotation_errors),
     )
-    together = (parts[..., 0].sum(axis=1) ** 2).sum() / 2
-    sensor = ((parts**2).sum() - together) / (40 * 5)
-    assert found.position_m == pytest.approx(np.sqrt(sensor), rel=1e-3)
-    assert found.orientation_rad == pytest.approx(
-        np.sqrt((turns**2).mean() if rows == 6 else sensor), rel=1e-3
-    )
-    # Two targets see the same forty draws of the joint.
-    assert found.joint_rad[0] == pytest.approx(
-        np.sqrt((together / 40 - sensor) / 2) * safe_side(40), rel=1e-3
+    along_joint = (contrasts[..., 0].sum(axis=1) ** 2).sum() / 2
+    variance = ((contrasts**2).sum() - along_joint) / (40 * 5)
+    rotation_variance = (rotation_contrasts**2).mean() if rows == 6 else variance
+    assert noise.position_m == pytest.approx(np.sqrt(variance), rel=1e-3)
+    assert noise.orientation_rad == pytest.approx(np.sqrt(rotation_variance), rel=1e-3)
+    # Both targets measure the same forty draws of the joint error.
+    assert noise.joint_rad[0] == pytest.approx(
+        np.sqrt((along_joint / 40 - variance) / 2) * compute_safety_factor(40), rel=1e-3
     )
 
 
 @pytest.mark.parametrize("joints", [1, 2, 3])
-def test_joints_are_taken_where_they_raise_the_log_likelihood_by_more_than_one_each(
+def test_joint_noise_is_used_if_it_raises_the_log_likelihood_by_more_than_one_a_joint(
     joints,
 ):
-    """Akaike's criterion, at contrasts for which the gain over the sensor alone is
-    known exactly."""
-    model, estimate = gantry(
-        " ".join(f"Tx(q{number})" for number in range(1, joints + 1)) + " [hand]"
-    )
+    """Akaike's criterion, at contrasts whose gain over the sensor noise alone is known
+    exactly."""
+    names = [f"Tx(q{number})" for number in range(1, joints + 1)]
+    model, estimate = make_gantry(" ".join(names) + " [hand]")
     poses = 40
 
-    def gain(ratio):
+    def compute_gain(ratio):
         return 0.5 * poses * (3 * np.log((ratio**2 + 2) / 3) - np.log(ratio**2))
 
-    for off, taken in ((-0.05, False), (0.05, True)):
-        ratio = brentq(lambda ratio, off=off: gain(ratio) - joints - off, 1.0, 10.0)
-        parts = SENSOR_M * np.array([ratio, 1.0, 1.0]) * np.ones((poses, 1, 3))
-        found = estimate_noise_from_repeats(
-            model, estimate, off_by(model, mirrored(parts))
+    for margin, is_used in ((-0.05, False), (0.05, True)):
+        ratio = brentq(
+            lambda ratio, margin=margin: compute_gain(ratio) - joints - margin,
+            1.0,
+            10.0,
         )
-        assert found.joint_rad.any() == taken, ratio
+        contrasts = SENSOR_M * np.array([ratio, 1.0, 1.0]) * np.ones((poses, 1, 3))
+        noise = estimate_noise_from_repeats(
+            model,
+            estimate,
+            measure_with_errors(model, make_symmetric_repeats(contrasts)),
+        )
+        assert noise.joint_rad.any() == is_used, ratio
 
 
-def test_of_more_contrasts_than_are_needed_those_of_states_spread_over_the_campaign_are_taken(
+def test_a_sample_of_many_contrasts_is_spread_over_the_campaign(
     monkeypatch,
 ):
-    """The later half is three times as noisy: a half of the states shows both halves
-    alike."""
-    model, estimate = gantry()
-    parts = SENSOR_M * np.repeat([1.0, 3.0], 20)[:, None, None] * np.ones((40, 1, 3))
-    measurements = off_by(model, mirrored(parts))
-    for most, freedom in ((120, 120), (60, 60)):
-        monkeypatch.setattr(noise_module, "MAX_CONTRASTS", most)
-        found = estimate_noise_from_repeats(model, estimate, measurements)
-        assert found.degrees_of_freedom == freedom
-        assert found.position_m == pytest.approx(np.sqrt(5) * SENSOR_M, rel=1e-6)
+    """The second half of the campaign is three times as noisy; a sample of a half of
+    the states contains as much of either half."""
+    model, estimate = make_gantry()
+    contrasts = (
+        SENSOR_M * np.repeat([1.0, 3.0], 20)[:, None, None] * np.ones((40, 1, 3))
+    )
+    measurements = measure_with_errors(model, make_symmetric_repeats(contrasts))
+    for limit, freedom in ((120, 120), (60, 60)):
+        monkeypatch.setattr(noise_module, "MAX_CONTRASTS", limit)
+        noise = estimate_noise_from_repeats(model, estimate, measurements)
+        assert noise.degrees_of_freedom == freedom
+        assert noise.position_m == pytest.approx(np.sqrt(5) * SENSOR_M, rel=1e-6)
 
 
-@pytest.mark.parametrize("part", ["approach", "load", "session"])
-def test_only_approaches_to_one_state_from_one_side_are_repeats_of_each_other(part):
-    """What differs between two senses, loads or sessions is no noise, however much it
-    is."""
-    model, estimate = gantry()
+@pytest.mark.parametrize("column", ["approach", "load", "session"])
+def test_measurements_that_differ_in_side_load_or_session_are_no_repeats(column):
+    """A difference between two directions of approach, loads or sessions is no noise,
+    however large it is."""
+    model, estimate = make_gantry()
     estimate = replace(
         estimate,
         sessions=(0, 1),
         frame_rotation=np.tile(np.eye(3), (2, 1, 1)),
         frame_position=np.zeros((2, 3)),
     )
-    parts = SENSOR_M * np.random.default_rng(25).standard_normal((5, 2, 1, 3))
-    # Of four measurements of a pose the first two and the last two belong together.
-    off = np.concatenate([mirrored(parts[:, 0]), 1e-3 + mirrored(parts[:, 1])], axis=1)
-    measurements = off_by(model, off)
+    contrasts = SENSOR_M * np.random.default_rng(25).standard_normal((5, 2, 1, 3))
+    # Of the four measurements of a pose, the first two and the last two are repeats.
+    errors = np.concatenate(
+        [
+            make_symmetric_repeats(contrasts[:, 0]),
+            1e-3 + make_symmetric_repeats(contrasts[:, 1]),
+        ],
+        axis=1,
+    )
+    measurements = measure_with_errors(model, errors)
     later = measurements.repeat // 2
     values = {"approach": 2.0 * later[:, None] - 1.0, "load": later, "session": later}
-    found = estimate_noise_from_repeats(
-        model, estimate, replace(measurements, **{part: values[part]})
+    noise = estimate_noise_from_repeats(
+        model, estimate, replace(measurements, **{column: values[column]})
     )
-    assert found.degrees_of_freedom == 30
-    assert found.position_m == pytest.approx(np.sqrt((parts**2).mean()), rel=1e-6)
+    assert noise.degrees_of_freedom == 30
+    assert noise.position_m == pytest.approx(np.sqrt((contrasts**2).mean()), rel=1e-6)
 
 
 @pytest.mark.parametrize("rows", [3, 6])
 @pytest.mark.parametrize("end", [0, 1])
-def test_declared_noise_is_doubted_beyond_the_range_of_chance_in_a_hundred_campaigns(
+def test_declared_noise_is_doubted_outside_the_range_of_99_in_100_campaigns(
     fanuc, rows, end
 ):
-    """The 0.5 and 99.5 % quantiles of a standard deviation from so many contrasts of
-    positions."""
-    model, estimate = gantry(rows=rows)
-    parts = mirrored(SENSOR_M * np.ones((12, 1, 3)))
-    measurements = off_by(model, parts, parts if rows == 6 else None)
+    """The range lies between the 0.5 and 99.5 % quantiles of a standard deviation from
+    so many contrasts of positions."""
+    model, estimate = make_gantry(rows=rows)
+    errors = make_symmetric_repeats(SENSOR_M * np.ones((12, 1, 3)))
+    measurements = measure_with_errors(model, errors, errors if rows == 6 else None)
     limit = np.sqrt(chi2.ppf([0.005, 0.995][end], 36) / 36)
-    for share, warned in ((0.999, end == 0), (1.001, end == 1)):
-        declared = replace(
-            campaign(fanuc, position_m=SENSOR_M / (share * limit)),
+    for share, warns in ((0.999, end == 0), (1.001, end == 1)):
+        campaign = replace(
+            declare_campaign(fanuc, position_m=SENSOR_M / (share * limit)),
             measurements=measurements,
         )
-        assert len(choose_noise(declared, model, estimate)[1]) == warned
+        assert len(choose_noise(campaign, model, estimate)[1]) == warns
 
 
 @pytest.mark.parametrize("joint_rad", [5e-6, 2e-5])
-def test_joints_that_the_sensor_hides_are_found_where_all_repeat_alike(
+def test_joint_noise_below_the_sensor_noise_is_estimated_if_all_joints_repeat_alike(
     fanuc, joint_rad
 ):
-    """A tenth to four tenths of the sensor at 2 m: on average over six campaigns within
-    a third."""
-    found = np.array(
+    """At 2 m the joints contribute a tenth to four tenths of the sensor noise. The mean
+    over six campaigns is right within a third."""
+    estimates = np.array(
         [
-            estimate_joint_repeatability(*drawn(fanuc, seed, joint_rad=joint_rad))
+            estimate_joint_repeatability(
+                *simulate_repeats(fanuc, seed, joint_rad=joint_rad)
+            )
             for seed in range(6)
         ]
     )
-    assert np.sqrt((found[:, 0] ** 2).mean()) == pytest.approx(joint_rad, rel=0.35)
-    assert (found[:, 1] > 1.0).all()
+    assert np.sqrt((estimates[:, 0] ** 2).mean()) == pytest.approx(joint_rad, rel=0.35)
+    assert (estimates[:, 1] > 1.0).all()
 
 
-def test_without_repeats_nothing_is_said_of_joints(fanuc):
-    assert estimate_joint_repeatability(*drawn(fanuc, 1, poses=2, repeats=1)) == (
-        0.0,
-        0.0,
-    )
+def test_without_repeats_the_joint_repeatability_is_unknown(fanuc):
+    measured_once = simulate_repeats(fanuc, 1, poses=2, repeats=1)
+    assert estimate_joint_repeatability(*measured_once) == (0.0, 0.0)
 
 
-def test_noise_comes_back_from_its_document():
+def test_noise_is_read_back_from_its_document():
     noise = Noise("repeats", 1e-5, 2e-5, np.array([1e-6, 0, 3e-6]), 77, 2e-6)
-    back = parse_noise({"noise": serialize_noise(noise), "warnings": []})
-    np.testing.assert_array_equal(back.joint_rad, noise.joint_rad)
-    assert replace(back, joint_rad=None) == replace(noise, joint_rad=None)
+    parsed = parse_noise({"noise": serialize_noise(noise), "warnings": []})
+    np.testing.assert_array_equal(parsed.joint_rad, noise.joint_rad)
+    assert replace(parsed, joint_rad=None) == replace(noise, joint_rad=None)
 
 
 JOINTS = (2, 3, 4, 5)
 
 
-def campaign_of(robot, offset, **options):
-    """A robot whose joints 2 to 5 are off by an angle or its opposite, and its model
-    with these offsets declared."""
+def plant_joint_offsets(robot, offset, **options):
+    """Make a campaign of a robot whose joints 2 to 5 have an offset of alternating
+    sign, and a model that declares these offsets."""
     keys = [f"joint_offset@{joint}" for joint in JOINTS]
     campaign = planted(
         robot,
-        {key: [offset * (-1) ** n] for n, key in enumerate(keys)},
+        {key: [offset * (-1) ** number] for number, key in enumerate(keys)},
         seed=2,
         **options,
     )
-    return campaign, campaign.declared.model.with_effects(
+    model = campaign.declared.model.with_effects(
         [campaign.candidates[key] for key in keys]
     )
+    return campaign, model
 
 
-def wide_fit(campaign, model, share=1.0):
+def fit_with_wide_prior(campaign, model, share=1.0):
+    """Fit with the widest prior and a share of the true noise."""
     return fit_model(
         set_prior_scale(model, PRIOR_SCALES[-1]),
         campaign.observations,
@@ -324,93 +369,100 @@ def wide_fit(campaign, model, share=1.0):
     )
 
 
-@pytest.mark.parametrize(("offset", "size"), [(1e-4, 0.1), (1e-3, 1.0), (1e-2, 10.0)])
-def test_declared_geometry_has_the_size_that_the_measurements_make_most_probable(
-    offset, size, kuka
+@pytest.mark.parametrize(("offset", "scale"), [(1e-4, 0.1), (1e-3, 1.0), (1e-2, 10.0)])
+def test_the_prior_of_the_declared_geometry_has_the_scale_of_the_largest_evidence(
+    offset, scale, kuka
 ):
-    campaign, model = campaign_of(kuka, offset)
-    # Springs of the joints have no size: they have no prior.
+    campaign, model = plant_joint_offsets(kuka, offset)
+    # Joint compliances have no plausible scale, so they have no prior.
     assert find_declared_geometry(model) == {"joint_offset"}
-    assert maximize_evidence(wide_fit(campaign, model))[0] == pytest.approx(
-        size, rel=0.01
-    )
-    fitted = fit_declared_model(model, campaign.observations, campaign.declared.noise)
-    priors = {owner: parameter.prior_std for owner, parameter in fitted.parameters}
+    wide = fit_with_wide_prior(campaign, model)
+    assert maximize_evidence(wide)[0] == pytest.approx(scale, rel=0.01)
+    fit = fit_declared_model(model, campaign.observations, campaign.declared.noise)
+    priors = {owner: parameter.prior_std for owner, parameter in fit.parameters}
     assert [priors[f"joint_offset@{joint}"] for joint in JOINTS] == pytest.approx(
-        [size * 1e-3] * 4, rel=0.01
+        [scale * 1e-3] * 4, rel=0.01
     )
     assert priors["joint_compliance"] is None
 
 
 @pytest.mark.parametrize("share", [1.0, 0.1, 0.01])
-def test_the_size_is_the_same_whatever_noise_was_taken_and_the_noise_comes_back(
-    share, kuka
-):
-    """Noise that is declared far too small must not make sizes small: they would be so
-    many standard errors, not so many mm."""
-    campaign, model = campaign_of(kuka, 1e-3)
-    size, factor = maximize_evidence(wide_fit(campaign, model, share))
-    assert size == pytest.approx(1.0, rel=0.01)
-    assert factor == pytest.approx(1.0 / share, rel=0.15)
+def test_the_prior_scale_does_not_depend_on_the_assumed_noise(share, kuka):
+    """A declared noise that is far too small must not make the prior scale small: the
+    scale is a length or an angle, not a number of standard errors. The true noise is
+    estimated with it."""
+    campaign, model = plant_joint_offsets(kuka, 1e-3)
+    scale, noise_factor = maximize_evidence(fit_with_wide_prior(campaign, model, share))
+    assert scale == pytest.approx(1.0, rel=0.01)
+    assert noise_factor == pytest.approx(1.0 / share, rel=0.15)
 
 
-def test_effective_parameters_are_the_trace_of_the_hat_matrix(kuka):
-    campaign, model = campaign_of(kuka, 1e-4, poses=6)
-    fitted = fit_model(
+def test_the_number_of_effective_parameters_is_the_trace_of_the_hat_matrix(kuka):
+    campaign, model = plant_joint_offsets(kuka, 1e-4, poses=6)
+    fit = fit_model(
         set_prior_scale(model, 0.1),
         campaign.observations,
         campaign.declared.noise.scaled(30.0),
     )
     rows = np.concatenate(
         [
-            white.reshape(-1, len(fitted.unidentifiable))
-            for _, _, white in fitted.iterate_sensitivities(campaign.observations)
+            white.reshape(-1, len(fit.unidentifiable))
+            for _, _, white in fit.iterate_sensitivities(campaign.observations)
         ]
     )
-    assert count_effective_parameters(fitted) == pytest.approx(
-        np.trace(rows @ fitted.covariance @ rows.T), rel=1e-3
+    assert count_effective_parameters(fit) == pytest.approx(
+        np.trace(rows @ fit.covariance @ rows.T), rel=1e-3
     )
-    assert count_effective_parameters(fitted) < (~fitted.unidentifiable).sum() - 0.5
+    assert count_effective_parameters(fit) < (~fit.unidentifiable).sum() - 0.5
 
 
-def case_of(robot, off=0.0, turned=0.0, noise=None, oriented=True, repeats=1):
-    """A known robot whose measurements are off by so much and turned by so much:
-    nothing is left to fit."""
-    plan = Plan(
-        poses=8, loads=1, repeats=repeats, noise=0.0, force=0.0, oriented=oriented
+def build_case_with_errors(robot, position_errors, rotation_errors, *, oriented):
+    """Build a case of a known robot with nothing to fit, whose measurements have these
+    errors, (M, 3) in m and rad."""
+    plan = Plan(poses=8, loads=1, repeats=1, noise=0.0, force=0.0, oriented=oriented)
+    campaign = replace(make_campaign(robot, 3, plan), compliance="nominal", noise=None)
+    measurements = campaign.measurements
+    measurements = replace(
+        measurements, position=measurements.position + position_errors
     )
-    campaign = replace(make_campaign(robot, 3, plan), compliance="nominal", noise=noise)
-    seen = campaign.measurements
-    seen = replace(seen, position=seen.position + off)
     if oriented:
-        turns = Rotation.from_rotvec(np.zeros_like(seen.position) + turned)
-        vectors = turns * Rotation.from_rotvec(seen.rotation_vector)
-        seen = replace(seen, rotation_vector=vectors.as_rotvec())
-    campaign = replace(campaign, measurements=seen)
-    return Case(campaign, average_repeats(seen), build_declared_model(campaign), {})
+        errors = Rotation.from_rotvec(rotation_errors)
+        rotation = errors * Rotation.from_rotvec(measurements.rotation_vector)
+        measurements = replace(measurements, rotation_vector=rotation.as_rotvec())
+    campaign = replace(campaign, measurements=measurements)
+    return Case(
+        campaign, average_repeats(measurements), build_declared_model(campaign), {}
+    )
 
 
-def errors(seed, size, repeats=1):
-    return size * np.random.default_rng(seed).standard_normal((8 * 2 * 4 * repeats, 3))
+def draw_errors(seed, size):
+    """Draw an error for each measurement of eight poses, two loads and four targets."""
+    return size * np.random.default_rng(seed).standard_normal((8 * 2 * 4, 3))
 
 
 @pytest.mark.parametrize("oriented", [False, True])
-def test_noise_is_the_root_mean_square_of_the_residual_where_nothing_else_says_it(
+def test_without_repeats_or_declaration_noise_is_the_root_mean_square_of_the_residual(
     fanuc, oriented
 ):
-    off = errors(1, 70e-6)
-    turned = errors(2, 20e-6)
-    noise, warnings = estimate_noise(case_of(fanuc, off, turned, oriented=oriented))
-    assert (
-        noise.source == "residual"
-        and noise.degrees_of_freedom == 0
-        and noise.pose_rad == 0.0
+    position_errors = draw_errors(1, 70e-6)
+    rotation_errors = draw_errors(2, 20e-6)
+    noise, warnings = estimate_noise(
+        build_case_with_errors(
+            fanuc, position_errors, rotation_errors, oriented=oriented
+        )
     )
-    assert noise.position_m == pytest.approx(np.sqrt((off**2).mean()), rel=1e-6)
-    # Where no orientation is measured it counts as in a declaration, as many radians as
-    # metres.
+    assert noise.source == "residual"
+    assert noise.degrees_of_freedom == 0
+    assert noise.pose_rad == 0.0
+    assert noise.position_m == pytest.approx(
+        np.sqrt((position_errors**2).mean()), rel=1e-6
+    )
+    # Without measured orientations their noise is, as in a declaration, as many radians
+    # as the position noise is metres.
+    expected = rotation_errors if oriented else position_errors
     assert noise.orientation_rad == pytest.approx(
-        np.sqrt(((turned if oriented else off) ** 2).mean()), rel=1e-6
+        np.sqrt((expected**2).mean()), rel=1e-6
     )
     np.testing.assert_array_equal(noise.joint_rad, np.zeros(6))
-    assert len(warnings) == 1 and "no repeats and no declared noise" in warnings[0]
+    assert len(warnings) == 1
+    assert "no repeats and no declared noise" in warnings[0]

@@ -1,5 +1,5 @@
-"""Observations: what is averaged with what, in which order, and with which
-rotations."""
+"""Observations average repeats of one state and target, in a fixed order and with
+means of rotations."""
 
 from dataclasses import replace
 
@@ -18,170 +18,203 @@ from elastocal.fitting.observations import (
 )
 
 
-def measurements(keys, position=None, **others):
-    """Measurements from rows of (session, pose, load, repeat, target)."""
-    names = ("session", "pose", "load", "repeat", "target")
+def build_measurements(keys, position=None, **columns):
+    """Build measurements from rows of (session, pose, load, repeat, target); all other
+    columns are random unless they are given."""
     rng = np.random.default_rng(0)
-    angles, wrench, place = (
-        rng.standard_normal((len(keys), size)) for size in (2, 6, 3)
-    )
-    places = dict(zip(names, np.array(keys).T, strict=True))
-    position = place if position is None else np.array(position, float)
+    count = len(keys)
+    joint_angles = rng.standard_normal((count, 2))
+    wrench = rng.standard_normal((count, 6))
+    random_position = rng.standard_normal((count, 3))
+    session, pose, load, repeat, target = np.array(keys).T
     return fill_measurements(
-        joint_angles=angles, wrench=wrench, position=position, **places, **others
+        session=session,
+        pose=pose,
+        load=load,
+        repeat=repeat,
+        target=target,
+        joint_angles=joint_angles,
+        wrench=wrench,
+        position=random_position if position is None else np.array(position, float),
+        **columns,
     )
 
 
-def full_measurements(seed, loads=2):
+def make_full_measurements(seed, loads=2):
+    """Make measurements of two sessions with three poses each, two repeats and two
+    targets."""
     rng = np.random.default_rng(seed)
     keys = [
-        (s, p, load, r, t)
-        for s in (0, 3)
-        for p in (2, 4, 9)
+        (session, pose, load, repeat, target)
+        for session in (0, 3)
+        for pose in (2, 4, 9)
         for load in range(loads)
-        for r in (0, 1)
-        for t in (0, 1)
+        for repeat in (0, 1)
+        for target in (0, 1)
     ]
     count = len(keys)
-    # Near half a turn a mean of rotation vectors would be far off.
+    # The mean of rotation vectors would be far off near a rotation by half a turn.
     centre = Rotation.concatenate(
         [Rotation.random(5, rng=rng), Rotation.from_rotvec([np.pi, 0, 0])]
     )
-    of_pose = np.repeat(np.arange(6), count // 6)
-    return measurements(
+    pose_index = np.repeat(np.arange(6), count // 6)
+    return build_measurements(
         keys,
         rng.standard_normal((count, 3)),
         rotation_vector=(
             Rotation.from_rotvec(1e-4 * rng.standard_normal((count, 3)))
-            * centre[of_pose]
+            * centre[pose_index]
         ).as_rotvec(),
-        approach=rng.choice([-1.0, 1.0], (6, 2))[of_pose],
+        approach=rng.choice([-1.0, 1.0], (6, 2))[pose_index],
         time_s=rng.uniform(0, 9, count),
         temperature_c=rng.uniform(20, 30, count),
     )
 
 
-@given(st.integers(0, 2**32 - 1))
-def test_averages_are_those_of_each_session_pose_load_side_and_target_by_hand(seed):
-    """Whatever the order of the rows, some of which are missing; rotations by scipy,
-    which differs in third order of 1e-4."""
-    taken = full_measurements(0)
+def draw_measurements(seed):
+    """Draw the order of the rows, three of which are missing; odd seeds also draw the
+    side from which each measurement is approached."""
+    measurements = make_full_measurements(0)
     rng = np.random.default_rng(seed)
-    taken = replace(
-        taken,
-        approach=rng.choice([-1.0, 1.0], (len(taken), 2))
-        if seed % 2
-        else taken.approach,
-    )
-    taken = taken.select(rng.permutation(len(taken))[: len(taken) - 3])
-    found = average_repeats(taken)
-    groups = {}
-    rows_found = 0
+    count = len(measurements)
+    if seed % 2:
+        approach = rng.choice([-1.0, 1.0], (count, 2))
+        measurements = replace(measurements, approach=approach)
+    return measurements.select(rng.permutation(count)[: count - 3])
+
+
+def group_by_state_and_target(measurements):
+    """Return the rows of each target of each (session, pose, load, *approach)."""
+    rows = {}
     keys = zip(
-        taken.session,
-        taken.pose,
-        taken.load,
-        *taken.approach.T,
-        taken.target,
+        measurements.session,
+        measurements.pose,
+        measurements.load,
+        *measurements.approach.T,
+        measurements.target,
         strict=True,
     )
     for row, (*state, target) in enumerate(keys):
-        groups.setdefault(tuple(state), {}).setdefault(target, []).append(row)
-    poses = sorted({state[:2] for state in groups})
-    for number, state in enumerate(sorted(groups)):
-        states = found.states
-        assert (
-            states.session[number],
-            states.pose[number],
-            states.load[number],
-            *states.approach[number],
-        ) == state
-        assert states.repeats[number] == min(map(len, groups[state].values()))
-        assert index_poses(states)[number] == poses.index(state[:2])
-        for target, rows in groups[state].items():
-            (place,) = np.flatnonzero(
-                (found.state == number) & (found.target == target)
+        rows.setdefault(tuple(state), {}).setdefault(target, []).append(row)
+    return rows
+
+
+def assert_state_is(states, index, key):
+    """Check session, pose, load and approach of one state."""
+    assert key == (
+        states.session[index],
+        states.pose[index],
+        states.load[index],
+        *states.approach[index],
+    )
+
+
+def assert_is_mean(observations, index, measurements, rows):
+    """Check that an observation is the mean of these rows; scipy's mean of rotations
+    differs from the library's in third order of 1e-4."""
+    np.testing.assert_allclose(
+        observations.position[index],
+        measurements.position[rows].mean(axis=0),
+        atol=1e-14,
+    )
+    rotations = Rotation.from_rotvec(measurements.rotation_vector[rows])
+    np.testing.assert_allclose(
+        observations.rotation[index], rotations.mean().as_matrix(), rtol=0, atol=1e-11
+    )
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_averages_are_those_of_each_session_pose_load_side_and_target_by_hand(seed):
+    """This holds for any order of the rows and if some are missing."""
+    measurements = draw_measurements(seed)
+    observations = average_repeats(measurements)
+    states = observations.states
+    rows_of_states = group_by_state_and_target(measurements)
+    poses = sorted({state[:2] for state in rows_of_states})
+    averages = 0
+    for index, state in enumerate(sorted(rows_of_states)):
+        rows_of_targets = rows_of_states[state]
+        pose_index = poses.index(state[:2])
+        assert_state_is(states, index, state)
+        assert states.repeats[index] == min(map(len, rows_of_targets.values()))
+        assert index_poses(states)[index] == pose_index
+        for target, rows in rows_of_targets.items():
+            (observation,) = np.flatnonzero(
+                (observations.state == index) & (observations.target == target)
             )
-            assert found.cluster[place] == poses.index(state[:2])
-            np.testing.assert_allclose(
-                found.position[place], taken.position[rows].mean(axis=0), atol=1e-14
-            )
-            turned = (
-                Rotation.from_rotvec(taken.rotation_vector[rows]).mean().as_matrix()
-            )
-            np.testing.assert_allclose(
-                found.rotation[place], turned, rtol=0, atol=1e-11
-            )
-            rows_found += 1
-    assert len(found.states) == len(groups) and len(found) == rows_found
-    again = average_repeats(taken.select(np.argsort(taken.row)))
-    for name, value in vars(found.states).items():
+            assert observations.cluster[observation] == pose_index
+            assert_is_mean(observations, observation, measurements, rows)
+            averages += 1
+    assert len(states) == len(rows_of_states)
+    assert len(observations) == averages
+    in_order = average_repeats(measurements.select(np.argsort(measurements.row)))
+    for name, value in vars(states).items():
         np.testing.assert_allclose(
-            value, getattr(again.states, name), rtol=0, atol=1e-14
+            value, getattr(in_order.states, name), rtol=0, atol=1e-14
         )
 
 
-def test_measurements_of_the_same_state_and_target_are_found():
-    single = full_measurements(2)
-    averages = average_repeats(single)
-    chosen = np.arange(len(averages)) % 3 == 0
-    of_state = list(
-        zip(
-            averages.states.session,
-            averages.states.pose,
-            averages.states.load,
-            strict=True,
+def test_measurements_of_the_same_state_and_target_are_matched():
+    measurements = make_full_measurements(2)
+    averages = average_repeats(measurements)
+    is_chosen = np.arange(len(averages)) % 3 == 0
+    states = averages.states
+    chosen_keys = {
+        (states.session[state], states.pose[state], states.load[state], target)
+        for state, target in zip(
+            averages.state[is_chosen], averages.target[is_chosen], strict=True
         )
+    }
+    keys = zip(
+        measurements.session,
+        measurements.pose,
+        measurements.load,
+        measurements.target,
+        strict=True,
     )
-    keys = [
-        (*of_state[state], target)
-        for state, target in zip(averages.state, averages.target, strict=True)
-    ]
-    wanted = {key for key, mine in zip(keys, chosen, strict=True) if mine}
-    rows = zip(single.session, single.pose, single.load, single.target, strict=True)
-    assert match_states_and_targets(single, averages, chosen).tolist() == [
-        key in wanted for key in rows
-    ]
-    assert (
-        match_states_and_targets(averages, averages, chosen).tolist() == chosen.tolist()
-    )
+    matched = match_states_and_targets(measurements, averages, is_chosen)
+    assert matched.tolist() == [key in chosen_keys for key in keys]
+    matched = match_states_and_targets(averages, averages, is_chosen)
+    assert matched.tolist() == is_chosen.tolist()
 
 
-def repeated(repeats, poses=30, seed=0, targets=2, single=0):
-    """Measurements with unit noise of poses with so many repeats, and of further ones
-    without."""
+def make_repeats(repeats, poses=30, seed=0, targets=2, measured_once=0):
+    """Make measurements with unit noise: `poses` poses with `repeats` repeats, then
+    `measured_once` poses without repeats."""
     keys = [
-        (0, p, 0, r, t)
-        for p in range(poses + single)
-        for r in range(repeats if p < poses else 1)
-        for t in range(targets)
+        (0, pose, 0, repeat, target)
+        for pose in range(poses + measured_once)
+        for repeat in range(repeats if pose < poses else 1)
+        for target in range(targets)
     ]
     rng = np.random.default_rng((1, seed))
-    place = 1e4 * rng.standard_normal((poses + single, targets, 3))
-    at = np.array([place[p, t] for _, p, _, _, t in keys])
-    return measurements(keys, at + rng.standard_normal(at.shape))
+    true_position = 1e4 * rng.standard_normal((poses + measured_once, targets, 3))
+    position = np.array([true_position[pose, target] for _, pose, _, _, target in keys])
+    return build_measurements(keys, position + rng.standard_normal(position.shape))
 
 
-def rows_lost(taken):
-    return sorted(set(taken.row) - set(remove_outlying_repeats(taken).row))
+def list_removed_rows(measurements):
+    """Return the rows of the file that are removed as outlying repeats."""
+    kept = remove_outlying_repeats(measurements)
+    return sorted(set(measurements.row) - set(kept.row))
 
 
 @pytest.mark.parametrize("repeats", [3, 4, 5])
-@pytest.mark.parametrize("off", [[30.0, 0, 0], [0, -30.0, 0], [0, 0, 30.0]])
-def test_a_wild_repeat_leaves_and_all_others_stay(repeats, off):
-    taken = repeated(repeats, seed=1, single=5)
-    for outlying in (0, 7, 30 * repeats):
-        moved = taken.position.copy()
-        moved[outlying] += off
-        assert rows_lost(replace(taken, position=moved)) == [outlying + 1]
+@pytest.mark.parametrize("error", [[30.0, 0, 0], [0, -30.0, 0], [0, 0, 30.0]])
+def test_an_outlying_repeat_is_removed_and_all_others_stay(repeats, error):
+    measurements = make_repeats(repeats, seed=1, measured_once=5)
+    for outlier in (0, 7, 30 * repeats):
+        position = measurements.position.copy()
+        position[outlier] += error
+        assert list_removed_rows(replace(measurements, position=position)) == [
+            outlier + 1
+        ]
 
 
 @pytest.mark.parametrize("repeats", [3, 4, 5, 6, 9])
-def test_clean_noise_loses_nothing(repeats):
-    """Of 3,600 poses: a rate of 1 in 1,000 is seen with a power of 0.97."""
-    assert (
-        sum(
-            len(rows_lost(repeated(repeats, poses=60, seed=seed))) for seed in range(60)
-        )
-        == 0
-    )
+def test_no_repeat_is_removed_from_clean_noise(repeats):
+    """With 3,600 poses, a rate of 1 in 1,000 would be detected with a power of 0.97."""
+    removed = 0
+    for seed in range(60):
+        removed += len(list_removed_rows(make_repeats(repeats, poses=60, seed=seed)))
+    assert removed == 0

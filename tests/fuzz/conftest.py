@@ -1,5 +1,5 @@
-"""How many inputs are tried: the suite's are always the same, `make fuzz` draws
-others."""
+"""Number of inputs that are tried. The test suite always tries the same ones; `make
+fuzz` draws new ones."""
 
 import os
 

@@ -1,11 +1,20 @@
-"""Whatever other people's files hold, an importer gives what robot files and campaigns
-may hold, or one line."""
+"""For any file of another program, an importer returns a valid robot or campaign, or
+refuses the file in one line."""
 
 import warnings
 
 import numpy as np
 import pytest
-from fuzzed import BYTES, CELLS, SCALARS, any_document, damaged, holds, over, tables
+from fuzzed import (
+    BYTES,
+    CELLS,
+    SCALARS,
+    any_document,
+    assert_read_or_refused,
+    assert_read_or_refused_from,
+    damaged,
+    tables,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 from made_urdf import joint, link, robot
@@ -29,7 +38,7 @@ URDF = robot(
 NUMBERS = st.floats().map(repr) | st.sampled_from(
     ["1e308", "-1e-320", "1e12", "1e16", "1_0", "٣", "inf", "9" * 400]
 )
-# What stands in attributes of people and of those who mean harm.
+# Values of attributes in files of people and of attackers.
 NAMES = [
     "a",
     "d",
@@ -42,7 +51,7 @@ NAMES = [
     "${x}",
     "٣ 0 0",
 ]
-WORDS = SCALARS.map(str) | CELLS | NUMBERS | st.sampled_from(NAMES)
+ATTRIBUTE_VALUES = SCALARS.map(str) | CELLS | NUMBERS | st.sampled_from(NAMES)
 ELEMENTS = (
     '<mimic joint="j1" multiplier="-1" offset="1e9"/>',
     '<axis xyz="1 1 1"/>',
@@ -55,7 +64,12 @@ ELEMENTS = (
     '<xi:include xmlns:xi="http://www.w3.org/2001/XInclude" href="/etc/passwd"/>',
     "<![CDATA[",
 )
-DH = "joint,theta_offset_deg,d_mm,a_m,alpha,type\nbase,0,250,0,90,R\n,5,0,0,0,F\nelbow,-3.5,0,0.4,1,R\n"
+DH = (
+    "joint,theta_offset_deg,d_mm,a_m,alpha,type\n"
+    "base,0,250,0,90,R\n"
+    ",5,0,0,0,F\n"
+    "elbow,-3.5,0,0.4,1,R\n"
+)
 ANGLE_CELLS = st.sampled_from(
     [
         "pi/0",
@@ -85,7 +99,8 @@ KINEMATICS = {
 TRACKER = (
     "Tracker 7;;\nPose;J1;J2 [deg];q3;X [mm];Y;Z;Target;qw;qx;qy;qz;fz [kN];time\n"
     + "".join(
-        f"{n};{n},5;{-n};{2 * n};{100 + n};{200 - n},25;{n};A;1;0;0;0;{-n % 3};{10 * n}\n"
+        f"{n};{n},5;{-n};{2 * n};{100 + n};{200 - n},25;{n};A;1;0;0;0;"
+        f"{-n % 3};{10 * n}\n"
         for n in range(1, 7)
     )
 )
@@ -137,50 +152,48 @@ def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("imports")
 
 
-def quietly(path, content, read):
-    """As `over`; a warning of numpy would stand on the terminal beside the line."""
+def assert_quietly_read_or_refused(path, content, read):
+    """Check a reader of a file with some content; it must not warn either, because a
+    warning of numpy would appear on the terminal next to the message."""
 
-    def without_warnings():
+    def read_without_warnings():
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            holds(read)
+            assert_read_or_refused(read)
 
     path.touch()
-    over(path, content, without_warnings)
+    assert_read_or_refused_from(path, content, read_without_warnings)
 
 
-def imported(folder, make):
-    """A robot is imported: its file, once written, is one that is read."""
-    result = make()
-    write_robot(result, folder / "robot.yaml")
-    again = read_robot(folder / "robot.yaml")
-    assert again.joints == result.robot.joints and again.name == result.robot.name
-    assert np.isfinite(again.joint_limits).all() and all(
-        np.isfinite(mass.centre_m).all() for mass in again.masses
-    )
+def write_and_read_robot(folder, imported):
+    """Check that an imported robot can be written to a file and read from it."""
+    write_robot(imported, folder / "robot.yaml")
+    robot = read_robot(folder / "robot.yaml")
+    assert robot.joints == imported.robot.joints
+    assert robot.name == imported.robot.name
+    assert np.isfinite(robot.joint_limits).all()
+    for mass in robot.masses:
+        assert np.isfinite(mass.centre_m).all()
 
 
 @st.composite
 def urdf_files(draw):
-    """A URDF with attributes changed, elements put in or bytes damaged."""
+    """Draw a URDF with attributes changed, elements inserted or bytes damaged."""
     text = URDF
     for _ in range(draw(st.integers(1, 3))):
         pieces = text.split('"')
         if len(pieces) > 2 and draw(st.booleans()):
-            # Every second piece stands between quotes.
-            place = 2 * draw(st.integers(0, len(pieces) // 2 - 1)) + 1
-            pieces[place] = draw(WORDS).replace('"', "&quot;").replace("<", "&lt;")
+            # Every second piece is between quotes.
+            index = 2 * draw(st.integers(0, len(pieces) // 2 - 1)) + 1
+            pieces[index] = (
+                draw(ATTRIBUTE_VALUES).replace('"', "&quot;").replace("<", "&lt;")
+            )
             text = '"'.join(pieces)
         else:
-            parts = text.split(">")
-            place = draw(st.integers(0, len(parts) - 1))
-            text = ">".join(
-                [
-                    *parts[:place],
-                    parts[place] + ">" + draw(st.sampled_from(ELEMENTS)),
-                    *parts[place + 1 :],
-                ]
-            )
+            tags = text.split(">")
+            index = draw(st.integers(0, len(tags) - 1))
+            tags[index] += ">" + draw(st.sampled_from(ELEMENTS))
+            text = ">".join(tags)
     content = text.encode(
         draw(st.sampled_from(["utf-8", "utf-8", "utf-8", "utf-16"])), "surrogatepass"
     )
@@ -191,10 +204,12 @@ def urdf_files(draw):
     urdf_files() | BYTES,
     st.sampled_from([("a", "d"), ("a", "c"), ("b", "a"), ("", "x\n")]),
 )
-def test_robots_as_urdf(folder, content, ends):
+def test_a_urdf_is_imported_or_refused(folder, content, ends):
     path = folder / "arm.urdf"
-    quietly(
-        path, content, lambda: imported(folder, lambda: robot_from_urdf(path, *ends))
+    assert_quietly_read_or_refused(
+        path,
+        content,
+        lambda: write_and_read_robot(folder, robot_from_urdf(path, *ends)),
     )
 
 
@@ -208,82 +223,85 @@ def test_robots_as_urdf(folder, content, ends):
     st.sampled_from(["deg", "rad"]),
     st.sampled_from(["arm.csv", "calib.yaml"]),
 )
-def test_denavit_hartenberg_tables_and_kinematics_of_ros_drivers(
+def test_dh_tables_and_kinematics_of_ros_drivers_are_imported_or_refused(
     folder, content, modified, angles, name
 ):
     path = folder / name
-    quietly(
+    assert_quietly_read_or_refused(
         path,
         content,
-        lambda: imported(
-            folder, lambda: robot_from_dh(path, modified, DhOptions(angles, "m"))
+        lambda: write_and_read_robot(
+            folder, robot_from_dh(path, modified, DhOptions(angles, "m"))
         ),
     )
 
 
-def imports_again(folder, path, options):
-    """What is imported is finite, can be written, and comes out again with the options
-    that were found out."""
-    found = read_measurement_table(path, options)
-    for name, column in found.table.items():
+def import_twice(folder, path, options):
+    """Check that an imported table is finite and can be written, and that an import
+    with the detected options returns the same table."""
+    imported = read_measurement_table(path, options)
+    for name, column in imported.table.items():
         assert name == "target" or np.isfinite(column).all()
         if name in ("pose", "load", "repeat", "session"):
             assert np.abs(column).max() < 2**31
-    write_measurements(str(folder / "measurements.csv"), found.table, found.joints)
-    again = read_measurement_table(path, found.options)
-    for name, column in found.table.items():
+    write_measurements(
+        str(folder / "measurements.csv"), imported.table, imported.joints
+    )
+    again = read_measurement_table(path, imported.options)
+    for name, column in imported.table.items():
         np.testing.assert_array_equal(column, again.table[name])
 
 
 @st.composite
 def changed_table(draw):
-    """The table with other names of columns and another cell."""
+    """Draw the table of the tracker with other column names and another cell."""
     first, names, *rows = (line.split(";") for line in TRACKER.splitlines())
     for _ in range(draw(st.integers(0, 2))):
         names[draw(st.integers(0, len(names) - 1))] = draw(st.sampled_from(HEADERS))
     rows[0][draw(st.integers(0, len(names) - 1))] = draw(
         CELLS | st.sampled_from(TIMES) | SCALARS.map(str)
     )
-    return "\n".join(";".join(row) for row in (first, names, *rows)).encode(
-        "utf-8", "surrogatepass"
-    )
+    lines = [";".join(row) for row in (first, names, *rows)]
+    return "\n".join(lines).encode("utf-8", "surrogatepass")
 
 
 @given(st.data())
-def test_measurements_of_other_programs(folder, data):
-    def sampled(*values):
+def test_measurements_of_other_programs_are_imported_or_refused(folder, data):
+    def pick(*values):
         return data.draw(st.sampled_from(values))
 
     content = TRACKER.encode()
     path = folder / "tracker.csv"
-    drawn = data.draw(BYTES | damaged(content) | tables(content, ";") | changed_table())
+    content = data.draw(
+        BYTES | damaged(content) | tables(content, ";") | changed_table()
+    )
     if data.draw(st.integers(0, 5)) == 0:
-        drawn = drawn.decode("utf-8", "replace").encode("utf-16")
+        content = content.decode("utf-8", "replace").encode("utf-16")
     options = ImportOptions(
-        separator=sampled(None, None, *SEPARATORS),
-        decimal=sampled(None, None, *DECIMALS),
-        header=sampled(None, None, 1, 2, 3),
-        encoding=sampled(None, None, "utf-8", "cp1252", "utf-16-le", "shift_jis"),
-        names=sampled((), (), [f"q{n}" for n in range(12)], ["q1", "x", "y", "z"]),
-        ignore=sampled((), (), ["time"], ["Z"]),
-        units=UNITS | {"angles": sampled("deg", "rad", "mm")},
-        rotation=sampled(None, None, "none", "vector", "euler:ZYX", "matrix", "euler:"),
-        target=sampled(None, "A"),
+        separator=pick(None, None, *SEPARATORS),
+        decimal=pick(None, None, *DECIMALS),
+        header=pick(None, None, 1, 2, 3),
+        encoding=pick(None, None, "utf-8", "cp1252", "utf-16-le", "shift_jis"),
+        names=pick((), (), [f"q{n}" for n in range(12)], ["q1", "x", "y", "z"]),
+        ignore=pick((), (), ["time"], ["Z"]),
+        units=UNITS | {"angles": pick("deg", "rad", "mm")},
+        rotation=pick(None, None, "none", "vector", "euler:ZYX", "matrix", "euler:"),
+        target=pick(None, "A"),
         skip_empty=data.draw(st.booleans()),
     )
-    quietly(path, drawn, lambda: imports_again(folder, path, options))
+    assert_quietly_read_or_refused(
+        path, content, lambda: import_twice(folder, path, options)
+    )
 
 
 @given(BYTES | damaged(WANTED.encode()) | tables(WANTED.encode()))
-def test_wanted_poses(folder, content):
+def test_wanted_poses_are_read_or_refused(folder, content):
     path = folder / "wanted.csv"
 
     def read():
-        found = read_target_path(path, 2)
-        assert (
-            np.isfinite(found.position).all()
-            and np.isfinite(found.rotation).all()
-            and len(found.lines) == len(found)
-        )
+        targets = read_target_path(path, 2)
+        assert np.isfinite(targets.position).all()
+        assert np.isfinite(targets.rotation).all()
+        assert len(targets.lines) == len(targets)
 
-    quietly(path, content, read)
+    assert_quietly_read_or_refused(path, content, read)

@@ -1,5 +1,5 @@
-"""Whatever a robot, a campaign or a tool is called, a program has the statements of its
-targets and no other."""
+"""A controller program contains the statements of its targets and no others, whatever
+the names of the robot, the campaign and the tool are."""
 
 import re
 
@@ -11,7 +11,7 @@ from made_targets import make_targets
 
 from elastocal.exchange.controllers import CONTROLLERS
 
-WORDS = [
+STATEMENTS = [
     "\r\n",
     "END",
     "ENDPROC",
@@ -23,56 +23,56 @@ WORDS = [
     "PTP {A1 0}",
     "MoveAbsJ target_1, v5000, fine, tool0;",
 ]
-WORDS += ["J P[1] 100% FINE ;", "movej([0,0,0,0,0,0])", "INT k", "$OV_PRO=100"]
-EVIL = st.sampled_from(
-    [*"\r\n\v\f\x1c\x85\u2028\u2029\0\x1b\"'`;!#%&{}[]()*/\\:=@$", *WORDS]
+STATEMENTS += ["J P[1] 100% FINE ;", "movej([0,0,0,0,0,0])", "INT k", "$OV_PRO=100"]
+HOSTILE_TEXT = st.sampled_from(
+    [*"\r\n\v\f\x1c\x85\u2028\u2029\0\x1b\"'`;!#%&{}[]()*/\\:=@$", *STATEMENTS]
 )
 NOTES = st.lists(
-    st.lists(EVIL | st.text(max_size=9), max_size=9).map("".join), max_size=5
+    st.lists(HOSTILE_TEXT | st.text(max_size=9), max_size=9).map("".join), max_size=5
 )
-# What a controller's own parser takes for a remark: KRL from ; and RAPID from ! to the
-# end of the line, URScript from #, TP an instruction that begins with !. All end a line
-# at a carriage return as well.
+# Remarks as the controller's own parser recognises them. KRL: from ; to the end of the
+# line; RAPID: from !; URScript: from #; TP: an instruction that begins with !. A
+# carriage return ends a line, too.
 REMARK = {
     "krl": r";[^\r\n]*",
     "rapid": r"![^\r\n]*",
     "urscript": r"#[^\r\n]*",
     "tp": r"(?m)^ *\d+: *![^;\r\n]*;",
 }
-ENDS = re.compile(r"[\r\n\v\f\x1c-\x1e\x85\u2028\u2029;]+")
+# Joint angles of a target in the four languages.
+TARGETS = re.compile(r"PTP (\{.*)|:= (\[.*)|movej\((\[.*\]),|GP1:([^}]*)")
+STATEMENT_ENDS = re.compile(r"[\r\n\v\f\x1c-\x1e\x85\u2028\u2029;]+")
 
 
-def statements(language, text):
-    """Without remarks and the numbers of lines."""
-    kept = (
-        re.sub(r"^ *\d+:", "", part).strip()
-        for part in ENDS.split(re.sub(REMARK[language], "", text))
-    )
-    return [part for part in kept if part]
+def list_statements(language, text):
+    """Return the statements of a program without remarks and line numbers."""
+    without_remarks = re.sub(REMARK[language], "", text)
+    statements = [
+        re.sub(r"^ *\d+:", "", statement).strip()
+        for statement in STATEMENT_ENDS.split(without_remarks)
+    ]
+    return [statement for statement in statements if statement]
+
+
+def parse_target(match):
+    """Return the first six numbers of a match of `TARGETS`."""
+    numbers = re.findall(r"(?<![\w.])-?\d+\.\d+", "".join(match))
+    return [float(number) for number in numbers][:6]
 
 
 @pytest.mark.parametrize("language", CONTROLLERS)
 @given(NOTES)
-def test_no_text_adds_a_statement_to_a_program_and_the_targets_come_back(
-    language, notes
-):
+def test_no_text_adds_a_statement_to_a_program_or_changes_its_targets(language, notes):
     module = CONTROLLERS[language]
     targets = make_targets(module)
     text = module.program("go", targets, notes)
-    assert statements(language, text) == statements(
+    assert list_statements(language, text) == list_statements(
         language, module.program("go", targets)
     )
-    assert text.isascii() and all(
-        character.isprintable() or character in "\n\t" for character in text
-    )
-    # Where the targets themselves stand.
-    lines = re.findall(r"PTP (\{.*)|:= (\[.*)|movej\((\[.*\]),|GP1:([^}]*)", text)
-    numbers = [
-        [float(n) for n in re.findall(r"(?<![\w.])-?\d+\.\d+", "".join(found))][:6]
-        for found in lines
-    ]
+    assert text.isascii()
+    assert all(character.isprintable() or character in "\n\t" for character in text)
     np.testing.assert_allclose(
-        numbers,
+        [parse_target(match) for match in TARGETS.findall(text)],
         np.radians(targets.values) if language == "urscript" else targets.values,
         atol=1e-6,
     )

@@ -1,5 +1,5 @@
-"""Whatever bytes a file holds, its reader gives a value or an InputError of one short
-line, in bounded time, and no more."""
+"""For any bytes in a file, its reader returns a value or raises an InputError of one
+short line, in bounded time."""
 
 import json
 
@@ -7,7 +7,16 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import yaml
-from fuzzed import BYTES, SCALARS, VALUES, any_document, damaged, holds, over, tables
+from fuzzed import (
+    BYTES,
+    SCALARS,
+    VALUES,
+    any_document,
+    assert_read_or_refused,
+    assert_read_or_refused_from,
+    damaged,
+    tables,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 from made_cells import ARM, DOCUMENT, Cell
@@ -71,7 +80,7 @@ def read_study(path):
     read_campaign_sources(config, CONFIG, path)
 
 
-# What a file of the cell is altered from, its name, and its readers.
+# Of each kind of file: its valid document, its name and its reader.
 READERS = {
     "campaign": (
         FULL,
@@ -99,24 +108,26 @@ READERS = {
     "strategy": (STRATEGY, "strategy.yaml", read_strategy),
     "configuration": (STUDY, "config.yaml", read_study),
 }
-# Columns of what no number is, or none of measurements, to be repeated.
-ODD = [
+# Values that are no numbers, or no numbers of measurements; a column repeats them.
+ODD_COLUMNS = [
     pa.array([value])
     for value in (None, True, b"\xff", [1.0], {"a": 1}, float("nan"), "\ud7ff" * 50)
 ]
-ODD += [
+ODD_COLUMNS += [
     pa.array(["A"]).dictionary_encode(),
     pa.array([None, 1.0]),
     pa.array([2**63], pa.uint64()),
 ]
-ODD += [pa.array([1], kind) for kind in (pa.timestamp("us"), pa.decimal128(20, 2))]
-ARRAYS = st.sampled_from(ODD)
+ODD_COLUMNS += [
+    pa.array([1], kind) for kind in (pa.timestamp("us"), pa.decimal128(20, 2))
+]
+ARRAYS = st.sampled_from(ODD_COLUMNS)
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory):
-    """A valid campaign in a folder, robots beside it; each test writes one file of its
-    own over it and takes it back."""
+def cell(tmp_path_factory):
+    """A valid campaign in a folder, next to its robots. Each test overwrites one file
+    and restores it."""
     cell = Cell(tmp_path_factory.mktemp("fuzz"))
     cell.document = FULL
     cell.write()
@@ -125,18 +136,19 @@ def place(tmp_path_factory):
 
 @pytest.mark.parametrize("kind", READERS)
 @given(st.data())
-def test_documents(place, kind, data):
+def test_a_document_is_read_or_refused(cell, kind, data):
     document, name, read = READERS[kind]
-    path = place.folder / name
+    path = cell.folder / name
     path.touch()
-    over(path, data.draw(any_document(document)), lambda: read(path))
+    content = data.draw(any_document(document))
+    assert_read_or_refused_from(path, content, lambda: read(path))
 
 
 @given(
     st.lists(st.sampled_from(PIECES), max_size=30).map("".join) | st.text(max_size=30)
 )
-def test_chains(text):
-    holds(lambda: parse_chain(text, {"l": 0.5}, "arm.yaml"))
+def test_a_kinematic_chain_is_parsed_or_refused(text):
+    assert_read_or_refused(lambda: parse_chain(text, {"l": 0.5}, "arm.yaml"))
 
 
 @given(
@@ -145,8 +157,8 @@ def test_chains(text):
     | VALUES.map(lambda value: json.dumps(value, default=str))
     | st.text(max_size=30),
 )
-def test_changes_on_the_command_line(key, text):
-    holds(
+def test_a_changed_entry_on_the_command_line_is_accepted_or_refused(key, text):
+    assert_read_or_refused(
         lambda: check_study(
             override_entries(STUDY, [f"{key}={text}"]), CONFIG, "config.yaml"
         )
@@ -154,41 +166,47 @@ def test_changes_on_the_command_line(key, text):
 
 
 @given(st.data())
-def test_measurements_as_text(place, data):
-    path = place.folder / "measurements.csv"
+def test_measurements_as_text_are_read_or_refused(cell, data):
+    path = cell.folder / "measurements.csv"
     content = path.read_bytes()
-    drawn = data.draw(BYTES | damaged(content) | tables(content))
-    over(path, drawn, lambda: read_campaign(place.open()))
+    content = data.draw(BYTES | damaged(content) | tables(content))
+    assert_read_or_refused_from(path, content, lambda: read_campaign(cell.open()))
 
 
 @pytest.fixture(scope="module")
 def parquet(tmp_path_factory):
+    """A valid campaign whose measurements are a parquet file."""
     cell = Cell(tmp_path_factory.mktemp("parquet"))
     cell.write("parquet")
     return cell
 
 
+def draw_with_odd_column(data, table):
+    """Draw a parquet file of a table with one column replaced; None if there is no such
+    file."""
+    index = data.draw(st.integers(0, table.num_columns - 1))
+    name = data.draw(
+        st.sampled_from([table.column_names[index], "x", "target", "é\n", ""])
+    )
+    file = pa.BufferOutputStream()
+    try:
+        values = data.draw(ARRAYS)
+        column = values.take([row % len(values) for row in range(len(table))])
+        pq.write_table(table.set_column(index, name, column), file)
+    except pa.ArrowException:
+        return None
+    return file.getvalue().to_pybytes()
+
+
 @given(st.data())
-def test_measurements_as_parquet(parquet, data):
+def test_measurements_as_parquet_are_read_or_refused(parquet, data):
     path = parquet.folder / "measurements.parquet"
-    content = path.read_bytes()
-    table = pa.table(parquet.table)
     if data.draw(st.booleans()):
-        drawn = data.draw(
-            damaged(content)
-            | st.binary(max_size=100).map(lambda inner: b"PAR1" + inner + b"PAR1")
-        )
+        framed = st.binary(max_size=100).map(lambda inner: b"PAR1" + inner + b"PAR1")
+        content = data.draw(damaged(path.read_bytes()) | framed)
     else:
-        column = data.draw(st.integers(0, table.num_columns - 1))
-        name = data.draw(
-            st.sampled_from([table.column_names[column], "x", "target", "é\n", ""])
+        content = draw_with_odd_column(data, pa.table(parquet.table))
+    if content is not None:
+        assert_read_or_refused_from(
+            path, content, lambda: read_campaign(parquet.open())
         )
-        sink = pa.BufferOutputStream()
-        try:
-            some = data.draw(ARRAYS)
-            column_of = some.take([row % len(some) for row in range(len(table))])
-            pq.write_table(table.set_column(column, name, column_of), sink)
-        except pa.ArrowException:
-            return
-        drawn = sink.getvalue().to_pybytes()
-    over(path, drawn, lambda: read_campaign(parquet.open()))

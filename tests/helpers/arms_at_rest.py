@@ -5,8 +5,13 @@ import re
 
 import numpy as np
 
-from elastocal_proof.plant.arm import arm_from_document
-from elastocal_proof.plant.machine import Structure, equilibrium, machine_of
+from elastocal_proof.plant.arm import build_arm
+from elastocal_proof.plant.multibody import (
+    EquilibriumProblem,
+    Structure,
+    build_model,
+    solve_equilibrium,
+)
 
 STATES = 40
 
@@ -20,9 +25,7 @@ def arm_of(chain, **more):
         "chain": chain,
         "compliance_urad_per_Nm": [*range(1, joints + 1)],
     }
-    return arm_from_document(
-        document | {"joint_limits_deg": [[-180, 180]] * joints} | more
-    )
+    return build_arm(document | {"joint_limits_deg": [[-180, 180]] * joints} | more)
 
 
 def driven_to(machine, angles):
@@ -43,20 +46,22 @@ def angles_and_wrenches(arm, force=1000.0, seed=0):
 
 def at_rest(arm, angles, wrench, structure=None, compliance=None):
     compliance = arm.compliance if compliance is None else compliance
-    machine = machine_of(arm, structure or Structure())
+    machine = build_model(arm, structure or Structure())
     growth = np.zeros((len(angles), arm.joints + 1))
-    return machine, equilibrium(
-        machine,
+    problem = EquilibriumProblem(
         angles,
-        lambda facing: wrench,
         growth,
-        lambda torque, unloaded: compliance * torque,
+        applied_wrench=lambda rotation: wrench,
+        gear_deflection=lambda torque, unloaded: compliance * torque,
     )
+    return machine, solve_equilibrium(machine, problem)
 
 
 def forces_at(machine, angles):
     """On the gears, and poses of the measuring points, where the drives stand at some
     angles and no spring has yielded."""
     growth = np.zeros((len(angles), angles.shape[1] + 1))
-    force, position, rotation = machine.forces(driven_to(machine, angles), growth)
+    force, position, rotation = machine.compute_forces(
+        driven_to(machine, angles), growth
+    )
     return force[:, machine.gear], position, rotation

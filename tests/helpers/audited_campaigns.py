@@ -15,14 +15,14 @@ from elastocal.io.storage import write_table
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop import schemas
 from elastocal.loop.loading import load_campaign
-from elastocal.loop.whole import judged
+from elastocal.loop.whole import judge_and_predict
 from elastocal_proof.audit.audit_run import find_checks
 from elastocal_proof.audit.finished_run import FinishedRun
 from elastocal_proof.blind.folders import write_blind_campaign
-from elastocal_proof.plant.arm import arm_from_file
-from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.kinds import drawn_defect, with_defects
-from elastocal_proof.plant.physical_robot import specimen
+from elastocal_proof.plant.arm import read_arm
+from elastocal_proof.plant.campaigns import Design, draw_schedule
+from elastocal_proof.plant.kinds import apply_defects, draw_defect
+from elastocal_proof.plant.simulated_robot import draw_specimen
 
 USUAL = {
     "poses": 12,
@@ -37,14 +37,14 @@ def diagnosed_campaign(top, robot, effects=(), **design):
     """Measure a robot of the plant with some defects, diagnose it, and write what an
     audit reads of it: the campaign `cell`."""
     file = ROBOTS / f"{robot}.yaml"
-    arm = arm_from_file(file)
+    arm = read_arm(file)
     planned = Design(**USUAL | {"points": arm.points[-1:]} | design)
-    bad = with_defects(
-        specimen(arm, 4, weighs=False),
-        [drawn_defect(effect, arm, 4) for effect in effects],
+    bad = apply_defects(
+        draw_specimen(arm, 4, weighs=False),
+        [draw_defect(effect, arm, 4) for effect in effects],
     )
     write_blind_campaign(
-        top / "cell", "cell", file, bad, planned, schedule_of(arm, planned, 3)
+        top / "cell", "cell", file, bad, planned, draw_schedule(arm, planned, 3)
     )
     results = top / "results/loop/cell"
     reports = top / "reports/loop/cell"
@@ -54,7 +54,7 @@ def diagnosed_campaign(top, robot, effects=(), **design):
     for name, part in zip(("training", "held_out"), parts, strict=True):
         write_table(
             results / f"{name}.parquet",
-            schemas.measurements(arm.joints),
+            schemas.build_measurements_schema(arm.joints),
             [tabulate_measurements(part)],
             {},
         )
@@ -65,14 +65,20 @@ def diagnosed_campaign(top, robot, effects=(), **design):
     found = diagnose(case, Settings(), 1)
     write_json(
         results / "diagnosis.json",
-        tables.diagnosis_facts(found) | {"covariance": found.final.covariance.tolist()},
+        tables.serialize_diagnosis(found)
+        | {"covariance": found.final.covariance.tolist()},
     )
-    write_table(results / "steps.parquet", schemas.STEPS, tables.step_blocks(found), {})
-    # As the next job does: from the files.
-    again = tables.diagnosis_from(case, tables.diagnosis_facts(found))
-    blocks = generate_residual_blocks(again, judged(again, unseen, 1))
     write_table(
-        reports / "residuals.parquet", schemas.residuals(arm.joints), blocks, {}
+        results / "steps.parquet", schemas.STEPS, tables.generate_step_blocks(found), {}
+    )
+    # As the next job does: from the files.
+    again = tables.restore_diagnosis(case, tables.serialize_diagnosis(found))
+    blocks = generate_residual_blocks(again, judge_and_predict(again, unseen, 1))
+    write_table(
+        reports / "residuals.parquet",
+        schemas.build_residuals_schema(arm.joints),
+        blocks,
+        {},
     )
     return top
 

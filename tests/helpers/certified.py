@@ -10,7 +10,7 @@ from loop_scripts import ANALYSIS, run_loop
 from made_folders import PLAN, make_folder, make_table
 
 from elastocal.campaigns.campaign_folder import read_campaign_folder
-from elastocal.io.origin import Origin, environment
+from elastocal.io.origin import Origin, list_versions
 from elastocal.io.records import JobRecord, digest_inputs, write_records
 
 # A module by which all was made.
@@ -79,7 +79,7 @@ def record_jobs(name, files, installed=None):
         digests, own = digest_inputs([*inputs, ENGINE], None if number else [ENGINE])
         times = f"2026-01-01T00:00:0{number}", f"2026-01-01T00:00:0{number + 1}"
         origin = Origin("c0ffee", "d16e57", 1)
-        here = installed or environment(".")
+        here = installed or list_versions(".")
         write_records(
             JobRecord(
                 rule,

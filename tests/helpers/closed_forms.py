@@ -15,7 +15,7 @@ from support import OTHER_CHAINS, TRACK, PinocchioPoint, chain_of
 from synthetic import displacements, equipped, make_states
 
 from elastocal.campaigns.reading import read_robot
-from elastocal.effects.conditions import conditions_of
+from elastocal.effects.conditions import build_conditions
 from elastocal.mechanics.chain import MeasuringPoint
 from elastocal.mechanics.kinematics import compute_poses_and_jacobians
 from elastocal.mechanics.robot import Mass
@@ -196,7 +196,7 @@ def arm_on(chain_name, kind):
         compute_poses_and_jacobians(sites.chain, coordinates, point)[2]
         for point in points
     ]
-    conditions = conditions_of(sites, arm.compliance, arm.states)
+    conditions = build_conditions(sites, arm.compliance, arm.states)
     return arm, conditions, np.stack(jacobians, axis=1)
 
 

@@ -1,5 +1,5 @@
-"""Damaged files: what hypothesis draws them from, and what a reader has to do with
-each."""
+"""Strategies of hypothesis for damaged files, and the check that a reader either reads
+a file or refuses it in one short line."""
 
 import copy
 
@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from elastocal.errors import LONGEST_MESSAGE, InputError
 
-# What stands in files of people and of those who mean harm; beyond floats and beyond
-# integers too.
+# Values in files of people and of attackers, some of them beyond the range of floats
+# or integers.
 SCALARS = st.one_of(
     st.none(),
     st.booleans(),
@@ -41,7 +41,7 @@ VALUES = st.recursive(
     ),
     max_leaves=8,
 )
-# Pieces of YAML of which a random text rarely holds two.
+# Pieces of YAML syntax; a random text rarely contains two of them.
 PIECES = ["&a ", "*a", "!!python/object:os.system ", "<<: ", "? ", "- ", "\n", "\n  "]
 PIECES += [*"{[}]\"'#|", ": ", "\t", "%", "---\n", "\0"]
 BYTES = st.one_of(
@@ -52,31 +52,29 @@ BYTES = st.one_of(
 )
 
 
-def paths_of(document, at=()):
-    """Ways to every value inside of a document."""
-    yield at
-    inner = (
-        document.items()
-        if isinstance(document, dict)
-        else enumerate(document)
-        if isinstance(document, list)
-        else ()
-    )
-    for key, value in inner:
-        yield from paths_of(value, (*at, key))
+def iterate_paths(document, path=()):
+    """Iterate over the paths of all values in a document, each a tuple of keys and
+    indices."""
+    yield path
+    children = ()
+    if isinstance(document, dict):
+        children = document.items()
+    elif isinstance(document, list):
+        children = enumerate(document)
+    for key, value in children:
+        yield from iterate_paths(value, (*path, key))
 
 
 @st.composite
 def altered(draw, document):
-    """A valid document with one to three values replaced, taken away, added or
-    renamed."""
+    """Draw a valid document with one to three values replaced, deleted, renamed or
+    enlarged."""
     document = copy.deepcopy(document)
     for _ in range(draw(st.integers(1, 3))):
-        *way, last = draw(
-            st.sampled_from([path for path in paths_of(document) if path] or [("x",)])
-        )
+        paths = [path for path in iterate_paths(document) if path]
+        *parents, last = draw(st.sampled_from(paths or [("x",)]))
         inner = document
-        for key in way:
+        for key in parents:
             inner = inner[key]
         change = draw(st.sampled_from(["replace", "delete", "rename", "enlarge"]))
         if change == "replace" or not document:
@@ -96,7 +94,8 @@ def altered(draw, document):
 
 @st.composite
 def damaged(draw, content):
-    """Bytes of a valid file, some of them overwritten, cut out or put in."""
+    """Draw the bytes of a valid file, with some of them overwritten, removed or
+    inserted."""
     content = bytearray(content)
     for _ in range(draw(st.integers(1, 4))):
         begin = draw(st.integers(0, len(content)))
@@ -105,38 +104,43 @@ def damaged(draw, content):
     return bytes(content)
 
 
-def written(document):
+def encode_document(document):
+    """Return a document as the bytes of a YAML file."""
     return yaml.dump(document, sort_keys=False, allow_unicode=True).encode(
         "utf-8", "surrogatepass"
     )
 
 
 def any_document(document):
-    """Files that hold a document, an altered one, a damaged one, or anything."""
-    return st.one_of(BYTES, altered(document).map(written), damaged(written(document)))
+    """Return a strategy for files that hold an altered document, a damaged one, or
+    anything."""
+    return st.one_of(
+        BYTES,
+        altered(document).map(encode_document),
+        damaged(encode_document(document)),
+    )
 
 
-def holds(read):
-    """Call a reader: a value, or one short line that can be printed, soon."""
+def assert_read_or_refused(read):
+    """Call a reader, and check that it soon returns a value or raises one short line
+    that can be printed."""
     with at_once():
         try:
             read()
         except InputError as error:
-            line = str(error)
-            assert (
-                len(line) <= LONGEST_MESSAGE
-                and line.isprintable()
-                and "; allowed: " in line
-            ), line
-            line.encode("utf-8")
+            message = str(error)
+            assert len(message) <= LONGEST_MESSAGE, message
+            assert message.isprintable(), message
+            assert "; allowed: " in message, message
+            message.encode("utf-8")
 
 
-def over(path, content, read):
-    """Call a reader while a file holds other bytes."""
+def assert_read_or_refused_from(path, content, read):
+    """Check a reader while a file holds other bytes, and restore the file."""
     before = path.read_bytes()
     try:
         path.write_bytes(content)
-        holds(read)
+        assert_read_or_refused(read)
     finally:
         path.write_bytes(before)
 
@@ -151,7 +155,7 @@ CELLS = st.one_of(
 
 @st.composite
 def tables(draw, content, separator=",", cells=CELLS):
-    """Bytes of a CSV file with cells, lines or columns changed."""
+    """Draw the bytes of a CSV file with cells, lines or columns changed."""
     lines = [line.split(separator) for line in content.decode().splitlines()]
     for _ in range(draw(st.integers(1, 3))):
         row = draw(st.integers(0, len(lines) - 1))

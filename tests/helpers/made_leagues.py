@@ -6,8 +6,8 @@ from made_remainders import smoothly_wrong_folder
 
 from elastocal.campaigns.campaign import tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
-from elastocal.loop.loading import described_campaign
-from elastocal_proof.league.methods import DataSet, dealt
+from elastocal.loop.loading import read_described_campaign
+from elastocal_proof.league.methods import DataSet, deal_folds
 
 
 def make_data_set(folder, robot, robots_folder, poses=24, **changes):
@@ -18,14 +18,14 @@ def make_data_set(folder, robot, robots_folder, poses=24, **changes):
         "declared": ["joint_offset"],
     } | changes
     smoothly_wrong_folder(folder, robot, poses=poses, **changes)
-    descriptions, campaign = described_campaign(
+    descriptions, campaign = read_described_campaign(
         read_campaign_folder(folder, robots_folder)
     )
     seen = campaign.measurements
     return DataSet(
         descriptions,
         tabulate_measurements(seen),
-        dealt(seen, 4, np.random.default_rng(1)),
+        deal_folds(seen, 4, np.random.default_rng(1)),
     )
 
 

@@ -17,7 +17,7 @@ from elastocal.diagnosis.verdict import (
     UNEXPLAINED,
 )
 from elastocal.io.typed_json import from_document, to_document
-from elastocal.report.loop_facts import loop_facts
+from elastocal.report.loop_facts import collect_loop_facts
 from elastocal.verdict import DataFault, Effect, Probabilities, Verdict
 
 # What of verdict.json is always the same.
@@ -306,7 +306,7 @@ def facts_of(verdict, **changed):
             name: np.array(values) for name, values in DATA["parameters"].items()
         },
     }
-    return loop_facts(verdict, **given | changed)
+    return collect_loop_facts(verdict, **given | changed)
 
 
 def plainly(text):

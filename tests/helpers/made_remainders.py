@@ -5,7 +5,7 @@ import numpy as np
 from made_folders import make_folder, make_table
 
 from elastocal.campaigns.simulation import Plan
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import read_cases
 from elastocal.residual_model.regressions import Inputs
 
 NOISE_M = 2e-5
@@ -58,4 +58,4 @@ def smoothly_wrong_folder(
 
 def smoothly_wrong_cases(folder, robot, robots_folder, **changes):
     """Training and held-out cases of such a folder."""
-    return cases_in(smoothly_wrong_folder(folder, robot, **changes), robots_folder)
+    return read_cases(smoothly_wrong_folder(folder, robot, **changes), robots_folder)

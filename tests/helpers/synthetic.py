@@ -9,7 +9,7 @@ from support import robot_on
 
 from elastocal.campaigns.campaign import Measurements, Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.effects.conditions import conditions_of
+from elastocal.effects.conditions import build_conditions
 from elastocal.effects.elastic import joint_compliance
 from elastocal.effects.gravity import declared_weight
 from elastocal.fitting.model import (
@@ -240,7 +240,7 @@ def conditions_on(holder, states, compliance=None):
     compliance = (
         1e-6 * np.arange(1, sites.joints + 1) if compliance is None else compliance
     )
-    return conditions_of(sites, compliance, states)
+    return build_conditions(sites, compliance, states)
 
 
 def find_candidate(holder, key):

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all."""
+"""A file appears complete or not at all."""
 
 from pathlib import Path
 
@@ -14,9 +14,7 @@ from elastocal.io.atomic_writes import (
 
 
 @pytest.mark.parametrize("before", [None, "much longer than what follows"])
-def test_a_file_appears_only_once_it_is_complete_and_replaces_what_was_there_as_a_whole(
-    tmp_path, before
-):
+def test_a_file_appears_when_it_is_complete_and_replaces_the_old_one(tmp_path, before):
     path = tmp_path / "one.txt"
     if before:
         path.write_text(before, encoding="utf-8")
@@ -45,7 +43,9 @@ def test_a_block_that_fails_leaves_the_old_file_and_no_other(tmp_path, error):
     ]
 
 
-def test_names_on_the_way_are_random_and_opened_exclusively(tmp_path, monkeypatch):
+def test_partial_files_have_random_names_and_are_opened_exclusively(
+    tmp_path, monkeypatch
+):
     names = set()
     for _ in range(20):
         with atomic_write(tmp_path / "one.txt") as partial:
@@ -62,30 +62,29 @@ def test_names_on_the_way_are_random_and_opened_exclusively(tmp_path, monkeypatc
     assert (tmp_path / "victim").read_text() == "mine"
 
 
-def test_old_files_are_gone_before_the_first_new_one_is_there(tmp_path, monkeypatch):
-    """Whenever it is killed: at each rename no file of before stands beside a new one,
-    and the user's own stay."""
+def test_old_files_are_removed_before_the_first_new_one_appears(tmp_path, monkeypatch):
+    """At each rename, no old file is next to a new one, and the user's files stay."""
     for name in ("a", "b", "c", "mine"):
         (tmp_path / name).write_text("old")
     rename = Path.rename
-    seen = []
+    states = []
 
-    def watched(path, target):
+    def rename_and_record(path, target):
         rename(path, target)
-        seen.append(
+        states.append(
             {
-                each.name: each.read_text()
-                for each in tmp_path.iterdir()
-                if each.is_file()
+                file.name: file.read_text()
+                for file in tmp_path.iterdir()
+                if file.is_file()
             }
         )
 
-    monkeypatch.setattr(Path, "rename", watched)
+    monkeypatch.setattr(Path, "rename", rename_and_record)
     with write_together(tmp_path, ["a", "b", "c"]) as partial:
         for name in "ab":
             (partial / name).write_text("new")
         assert (tmp_path / "a").read_text() == "old"
-    assert seen == [
+    assert states == [
         {"a": "new", "mine": "old"},
         {"a": "new", "b": "new", "mine": "old"},
     ]
@@ -110,10 +109,10 @@ def test_files_that_belong_together_appear_together_or_the_old_ones_stay(tmp_pat
     ) == ["a", "deep"]
 
 
-def test_what_killed_runs_left_is_taken_away_and_nothing_else(tmp_path):
-    left = tmp_path / "a" / f"one.parquet.{'0f' * 8}.partial"
-    left.parent.mkdir()
-    left.touch()
+def test_only_partial_files_of_killed_runs_are_removed(tmp_path):
+    partial = tmp_path / "a" / f"one.parquet.{'0f' * 8}.partial"
+    partial.parent.mkdir()
+    partial.touch()
     (tmp_path / f"new.{'0f' * 8}.partial").mkdir()
     (tmp_path / f"new.{'0f' * 8}.partial" / "file").touch()
     (tmp_path / "mine.partial").touch()

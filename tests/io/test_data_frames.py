@@ -1,11 +1,11 @@
-"""Tables as data frames, and data frames as tables for people."""
+"""Tables are read as data frames, and data frames are written for readers."""
 
 import numpy as np
 import pandas as pd
 
 from elastocal.io.data_frames import (
     read_frame,
-    read_long,
+    read_robot_tables,
     write_csv,
     write_latex,
     write_markdown,
@@ -16,7 +16,7 @@ from elastocal.io.storage import Column, TableSchema, write_table
 ORIGIN = Origin("c0ffee", "d16e57", 7)
 
 
-def test_tables_for_people_escape_what_latex_takes_for_commands_and_name_their_origin(
+def test_written_tables_escape_latex_commands_and_name_their_origin(
     tmp_path,
 ):
     frame = pd.DataFrame({"k_sigma_percent": ["1.0 ± 0.1"], "µm": ["5 %"]})
@@ -35,7 +35,7 @@ def test_tables_for_people_escape_what_latex_takes_for_commands_and_name_their_o
     assert (tmp_path / "t.csv").read_text(encoding="utf-8") == "x\n0.1\ninf\n"
 
 
-def per_joint(joints):
+def build_angles_schema(joints):
     return TableSchema(
         "angles",
         tuple(
@@ -45,7 +45,7 @@ def per_joint(joints):
     )
 
 
-def test_tables_of_many_robots_are_headed_by_their_origin_and_empty_where_joints_lack(
+def test_tables_of_several_robots_start_with_their_origin_and_lack_no_column(
     tmp_path,
 ):
     paths = []
@@ -61,11 +61,11 @@ def test_tables_of_many_robots_are_headed_by_their_origin_and_empty_where_joints
         }
         write_table(
             paths[-1],
-            per_joint(joints),
+            build_angles_schema(joints),
             [columns],
             {"robot": robot, "noise": noise, "configuration": settings},
         )
-    frame = read_long(paths, per_joint)
+    frame = read_robot_tables(paths, build_angles_schema)
     assert frame.index.tolist() == [0, 1, 2, 3] and frame.robot.tolist() == [
         "big",
         "big",
@@ -78,4 +78,6 @@ def test_tables_of_many_robots_are_headed_by_their_origin_and_empty_where_joints
     )
     np.testing.assert_allclose(frame.q2, [0.2, 0.4, 0.2, 0.4])
     np.testing.assert_allclose(frame.q3, [0.3, 0.6, np.nan, np.nan])
-    assert read_frame(paths[0], per_joint(3), ["q2"]).columns.tolist() == ["q2"]
+    assert read_frame(paths[0], build_angles_schema(3), ["q2"]).columns.tolist() == [
+        "q2"
+    ]

@@ -69,9 +69,9 @@ def numbers_in(schema, path=()):
 def test_every_quantity_has_a_least_and_a_largest(name):
     """A list of strange numbers would be left to some solver, which says nothing of the
     key."""
-    found = dict(numbers_in(read_schema(name)))
-    assert len(found) > 4
-    for path, rule in found.items():
+    rules = dict(numbers_in(read_schema(name)))
+    assert len(rules) > 4
+    for path, rule in rules.items():
         assert {"minimum", "exclusiveMinimum"} & set(rule), path
         assert {"maximum", "exclusiveMaximum"} & set(rule), path
 
@@ -168,8 +168,8 @@ def test_what_is_no_plain_document_is_refused_at_once(tmp_path, text, where, wor
 
 
 def test_numbers_are_read_as_people_write_them(tmp_path):
-    found = read(tmp_path, "[6e-5, 6E5, -1.5e5, 1.e3, .5, 17, +3, '1e5', a1e5]")
-    assert found == [6e-5, 6e5, -1.5e5, 1e3, 0.5, 17, 3, "1e5", "a1e5"]
+    values = read(tmp_path, "[6e-5, 6E5, -1.5e5, 1.e3, .5, 17, +3, '1e5', a1e5]")
+    assert values == [6e-5, 6e5, -1.5e5, 1e3, 0.5, 17, 3, "1e5", "a1e5"]
 
 
 STEERING = [

@@ -1,14 +1,11 @@
-"""JSON files come back as they were, look as they always did, and appear whole or not
-at all."""
+"""JSON files survive writing and reading, have one layout, and are written atomically."""
 
 import pytest
 
 from elastocal.io.json_files import read_json, write_json
 
 
-def test_written_file_has_one_space_of_indent_and_a_final_newline_and_none_is_left_of_what_is_no_json(
-    tmp_path,
-):
+def test_a_file_is_indented_and_invalid_json_leaves_the_old_file(tmp_path):
     path = tmp_path / "one.json"
     contents = {"pose": [1], "unit": "µm"}
     write_json(path, contents)

@@ -1,4 +1,4 @@
-"""A catalogue finds the modules beside it."""
+"""A catalogue finds the modules of its package."""
 
 import elastocal.io
 from elastocal.io.modules import list_modules

@@ -1,5 +1,5 @@
-"""A package that is installed beside elastocal offers effects, importers, controllers
-and regressions; an error in it is one line that names the package."""
+"""An installed package offers effects, importers, controllers and regressions; an error
+in it is one line that names the package."""
 
 import json
 import os
@@ -11,7 +11,12 @@ from types import SimpleNamespace
 import pytest
 from support import refused
 
-from elastocal.io.plugins import EFFECTS, load_plugins, plugin_names, plugin_versions
+from elastocal.io.plugins import (
+    EFFECTS,
+    list_plugin_names,
+    list_plugin_versions,
+    load_plugins,
+)
 
 PYPROJECT = """
 [build-system]
@@ -80,7 +85,7 @@ def fit_mean(inputs, residual, settings, seed):
 
 MEAN_RESIDUAL = Regression("mean residual", fit_mean)
 '''
-# Uses one plug-in of each kind, as the commands do, and prints what came of it.
+# Use one plug-in of each kind, as the commands do, and print the results.
 PROGRAM = """
 import json, sys
 from pathlib import Path
@@ -92,7 +97,7 @@ from elastocal.campaigns.importers import find_importer
 from elastocal.campaigns.reading import read_campaign, read_robot
 from elastocal.effects.catalogue import candidates_on, list_bundled_effects, list_effects
 from elastocal.exchange.controllers import axes_of, find_controller, targets_of
-from elastocal.io.origin import environment
+from elastocal.io.origin import list_versions
 from elastocal.loop.loading import load_campaign
 from elastocal.mechanics.sites import build_sites
 from elastocal.residual_model.regressions import Inputs, list_regressions
@@ -126,7 +131,7 @@ print(json.dumps({
     "remainder": descriptions["campaign"]["remainder"],
     "program": controller.program("GO", targets),
     "prediction": predictor.mean(inputs).tolist(),
-    "version": environment(folder)["workshop-plugins"],
+    "version": list_versions(folder)["workshop-plugins"],
 }))
 """
 
@@ -206,7 +211,7 @@ def test_an_error_in_a_plug_in_is_one_line_that_names_the_package(
     offer, name, module, reason
 ):
     offer(f"{name} = broken_module:tides", module)
-    assert plugin_names(EFFECTS) == [name]
-    assert plugin_versions() == {"broken-package": "0.3"}
+    assert list_plugin_names(EFFECTS) == [name]
+    assert list_plugin_versions() == {"broken-package": "0.3"}
     with refused("package broken-package", f"{EFFECTS} {name}", reason):
         load_plugins(EFFECTS, SimpleNamespace, ("payload",))

@@ -1,5 +1,5 @@
-"""Records of jobs: an altered, missing or unrecorded file is found by whoever reads it
-or what was made from it."""
+"""The next reader notices a file that was altered, is missing or has no record, and any
+file that it was made from."""
 
 import json
 import subprocess
@@ -28,7 +28,7 @@ FITTED = "results/fit.json"
 TABLE = "results/fit.csv"
 DRAWN = "reports/drawn.png"
 CODE = "src/fit.py"
-OWN = "data/mine.csv"
+USERS_FILE = "data/mine.csv"
 ALTERED = {
     MEASURED: f"{MEASURED}/2/case.json",
     FITTED: FITTED,
@@ -38,15 +38,15 @@ ALTERED = {
 
 
 def write(rule, number, inputs, outputs, checked=None):
-    """As a job does that ended well."""
-    digests, own = digest_inputs(inputs, checked)
+    """Write the records of a job that was successful."""
+    digests, users_inputs = digest_inputs(inputs, checked)
     job = JobRecord(
         rule,
         {"robot": "kuka"},
         f"{number}",
         f"{number + 1}",
         digests,
-        own,
+        users_inputs,
         tuple(outputs),
         ORIGIN,
         HERE,
@@ -57,12 +57,12 @@ def write(rule, number, inputs, outputs, checked=None):
 
 @pytest.fixture(autouse=True)
 def jobs(tmp_path, monkeypatch):
-    """Three of a chain, from a file of the user in a folder of the pipeline to a
-    figure, and one beside it."""
+    """Record a chain of three jobs, from a file of the user to a figure, and a separate
+    job; return the chain."""
     monkeypatch.chdir(tmp_path)
     for name in (
         CODE,
-        OWN,
+        USERS_FILE,
         f"{MEASURED}/1/case.json",
         f"{MEASURED}/2/case.json",
         FITTED,
@@ -72,27 +72,27 @@ def jobs(tmp_path, monkeypatch):
     ):
         Path(name).parent.mkdir(parents=True, exist_ok=True)
         Path(name).write_bytes(name.encode() + bytes(range(64)))
-    found = [
-        write("measure", 1, [OWN, CODE], [MEASURED], checked=[CODE]),
+    chain = [
+        write("measure", 1, [USERS_FILE, CODE], [MEASURED], checked=[CODE]),
         write("fit", 2, [MEASURED, CODE], [FITTED, TABLE]),
         write("draw", 3, [FITTED, CODE], [DRAWN, "docs/drawn.png"]),
     ]
     write("other", 4, [CODE], ["results/other.csv"])
-    return found
+    return chain
 
 
-def test_a_file_leads_back_to_every_job_behind_it_and_to_no_other(jobs):
+def test_a_file_is_traced_to_every_job_behind_it_and_to_no_other(jobs):
     assert trace_jobs([DRAWN]) == jobs
     assert trace_jobs([TABLE]) == jobs[:2]
     assert [job.name for job in jobs] == ["measure kuka", "fit kuka", "draw kuka"]
 
 
-@pytest.mark.parametrize("place", [0, 30, -1])
+@pytest.mark.parametrize("position", [0, 30, -1])
 @pytest.mark.parametrize("output", ALTERED)
-def test_any_altered_byte_is_found_by_the_next_job_and_by_all_who_follow(output, place):
+def test_an_altered_byte_is_noticed_by_every_later_job(output, position):
     altered = Path(ALTERED[output])
     content = bytearray(altered.read_bytes())
-    content[place] ^= 1
+    content[position] ^= 1
     altered.write_bytes(content)
     delete = f"(delete {'it' if output == ALTERED[output] else output}"
     with refused(altered.as_posix(), "", "other contents than were written", delete):
@@ -112,14 +112,14 @@ def test_a_missing_record_is_an_error(output):
         digest_inputs([output])
 
 
-def test_a_file_that_was_made_again_since_another_read_it_is_found(jobs):
+def test_a_file_that_changed_since_a_job_read_it_is_refused(jobs):
     Path(FITTED).write_text("another fit", encoding="utf-8")
     write_records(jobs[1])
     with refused(FITTED, "", "not what draw kuka read"):
         trace_jobs([DRAWN])
 
 
-def test_any_altered_character_of_a_record_is_found():
+def test_an_altered_character_of_a_record_is_noticed():
     path = locate_record(FITTED)
     written = path.read_text(encoding="utf-8")
     altered = [
@@ -143,7 +143,7 @@ def test_any_altered_character_of_a_record_is_found():
             read_record(FITTED)
 
 
-def test_sha256sum_reads_what_is_recorded():
+def test_sha256sum_checks_the_recorded_files():
     called = [sys.executable, "-m", "elastocal.io.records"]
     lines = subprocess.run(called, capture_output=True, text=True, check=True).stdout
     assert len(lines.splitlines()) == len(list_recorded_files()) == 6

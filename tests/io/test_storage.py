@@ -1,5 +1,4 @@
-"""Tables on disk: what is written comes back, and a file that is not as written is
-refused in one line."""
+"""Tables survive writing and reading, and a file that is not as written is refused."""
 
 from pathlib import Path
 
@@ -21,7 +20,7 @@ from elastocal.io.storage import (
 SCHEMA = TableSchema(
     "things",
     (
-        Column("kind", "string", "", "which thing; a row group holds one"),
+        Column("kind", "string", "", "kind of thing; one for each row group"),
         Column("number", "int32", "", "number of the thing", minimum=0),
         Column("length", "float64", "m", "how long it is"),
         Column("share", "float32", "", "share of it", missing=True),
@@ -33,7 +32,7 @@ ORIGIN = {"elastocal_version": "0.1.0", "configuration": {"seed": 1}, "noise_um"
 
 def block(kind, first, rows=3, **changes):
     numbers = np.arange(first, first + rows)
-    made = {
+    columns = {
         "kind": kind,
         "number": numbers,
         "length": 0.1 * numbers,
@@ -41,14 +40,14 @@ def block(kind, first, rows=3, **changes):
     }
     return {
         name: values
-        for name, values in (made | {"good": numbers % 3 == 0} | changes).items()
+        for name, values in (columns | {"good": numbers % 3 == 0} | changes).items()
         if values is not None
     }
 
 
 @pytest.fixture
 def new(tmp_path):
-    """Where no table is yet."""
+    """Path without a table."""
     return str(tmp_path / "new.parquet")
 
 
@@ -60,9 +59,9 @@ def path(tmp_path):
     return path
 
 
-def rewritten(path, change):
-    """The file with changed contents, its metadata and row groups kept: what an editor
-    other than the pipeline leaves."""
+def rewrite(path, change):
+    """Change the contents of a file as another program would, with the same metadata and
+    row groups."""
     with pq.ParquetFile(path) as file:
         metadata = {
             k: v
@@ -76,7 +75,7 @@ def rewritten(path, change):
         writer.add_key_value_metadata(metadata)
 
 
-def test_what_is_written_comes_back(path):
+def test_a_table_survives_writing_and_reading(path):
     table = read_table(path, SCHEMA)
     np.testing.assert_array_equal(table["kind"], list("aaabbaaa"))
     np.testing.assert_array_equal(table["number"], np.arange(8))
@@ -104,7 +103,7 @@ def test_only_row_groups_with_the_value_asked_for_are_read(path):
 
 
 @pytest.mark.parametrize(
-    ("changes", "key", "words"),
+    ("changes", "key", "phrases"),
     [
         ({"length": [0.1, np.nan, 0.3]}, "column length, row 1", ["nan", "finite"]),
         ({"number": [0, 4, -2]}, "column number, row 2", ["-2", ">= 0"]),
@@ -112,21 +111,19 @@ def test_only_row_groups_with_the_value_asked_for_are_read(path):
         ({"width": [1, 2, 3]}, "columns", ["width", "things"]),
     ],
 )
-def test_faulty_values_are_not_written(new, changes, key, words):
-    with refused(new, key, *words):
+def test_faulty_values_are_not_written(new, changes, key, phrases):
+    with refused(new, key, *phrases):
         write_table(new, SCHEMA, [block("a", 0), block("a", 3, **changes)], {})
     assert not Path(new).exists()
 
 
-def test_a_file_that_is_cut_off_or_has_another_column_or_is_somebody_elses_is_refused(
-    path, new
-):
+def test_a_truncated_file_and_another_table_are_refused(path, new):
     whole = Path(path).read_bytes()
     for share in (0.0, 0.3, 0.999):
         Path(new).write_bytes(whole[: int(share * len(whole))])
         with refused(new, "", "Parquet"):
             read_table(new, SCHEMA)
-    rewritten(
+    rewrite(
         path,
         lambda table: table.rename_columns(
             ["kind", "number", "lenght", "share", "good"]
@@ -151,7 +148,7 @@ TEXTS = TableSchema(
 ODD_TEXTS = ["", "µrad/(N·m)", "a, b\nc", "", "x" * 300]
 
 
-def test_text_columns_come_back_row_by_row(new):
+def test_text_columns_survive_row_by_row(new):
     odd = {"owner": ODD_TEXTS, "kind": "k"}
     more = {"owner": np.array(["a", "b", "a"], dtype=object), "kind": "l"}
     write_table(new, TEXTS, [odd, more], ORIGIN)
@@ -180,7 +177,7 @@ SOME = {"owner": ["a"], "kind": "k"}
 @pytest.mark.parametrize(
     ("blocks", "rows"), [([], 0), ([NONE], 0), ([NONE, SOME, NONE], 1)]
 )
-def test_tables_without_rows_come_back(blocks, rows, new):
+def test_tables_without_rows_survive(blocks, rows, new):
     write_table(new, TEXTS, blocks, ORIGIN)
     back = read_table(new, TEXTS)
     assert {

@@ -1,4 +1,4 @@
-"""Files that people hand in: bounded, regular, UTF-8; numbers as people write them."""
+"""Files of users are bounded, regular and UTF-8, and numbers are decimal."""
 
 import os
 
@@ -8,7 +8,7 @@ from support import refused
 from elastocal.io.texts import LARGEST_NUMBER, parse_number, read_bytes, read_text
 
 
-def test_contents_are_read_up_to_a_bound_and_what_might_never_end_is_not_opened(
+def test_files_are_read_up_to_a_bound_and_pipes_are_not_opened(
     tmp_path,
 ):
     path = tmp_path / "a.txt"
@@ -19,23 +19,23 @@ def test_contents_are_read_up_to_a_bound_and_what_might_never_end_is_not_opened(
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "zero").symlink_to("/dev/zero")
     (tmp_path / "loop").symlink_to("loop")
-    for name, words in (
+    for name, finding in (
         ("pipe", "a pipe"),
         ("zero", "a device"),
         ("loop", "Too many levels"),
         ("", "a folder"),
     ):
-        with refused(tmp_path / name, "", words):
+        with refused(tmp_path / name, "", finding):
             read_bytes(tmp_path / name, 10)
-    for name, words in (
+    for name, finding in (
         ("none", "no such file; allowed: the path of a readable file"),
         ("a\0b", "null"),
     ):
-        with refused("", "", words):
+        with refused("", "", finding):
             read_bytes(tmp_path / name, 10)
 
 
-def test_text_loses_its_mark_and_other_encodings_are_refused_with_their_line(tmp_path):
+def test_a_byte_order_mark_is_removed_and_another_encoding_is_refused(tmp_path):
     path = tmp_path / "a.txt"
     path.write_text("é\r\n", encoding="utf-8-sig", newline="")
     assert read_text(path, 100) == "é\r\n"
@@ -54,5 +54,5 @@ def test_text_loses_its_mark_and_other_encodings_are_refused_with_their_line(tmp
         ("1e12", LARGEST_NUMBER),
     ],
 )
-def test_numbers_as_people_write_them(text, value):
+def test_decimal_numbers_are_parsed(text, value):
     assert parse_number(text) == value

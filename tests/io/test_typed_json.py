@@ -10,8 +10,8 @@ import pytest
 from elastocal.errors import InputError
 from elastocal.io.typed_json import (
     OMITTED_BY_DEFAULT,
+    build_json_schema,
     from_document,
-    json_schema,
     to_document,
 )
 
@@ -53,7 +53,7 @@ def test_a_dataclass_survives_the_way_through_json(closed):
     document = json.loads(json.dumps(to_document(drawing)))
     assert ("closed" in document) == closed
     assert from_document(Drawing, document, "file") == drawing
-    jsonschema.validate(document, json_schema(Drawing))
+    jsonschema.validate(document, build_json_schema(Drawing))
 
 
 @pytest.mark.parametrize(
@@ -75,7 +75,7 @@ def test_a_wrong_document_is_refused_by_key_and_by_schema(changes, key):
         from_document(Drawing, document, "file")
     assert error.value.key.startswith(key) and error.value.source == "file"
     with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(document, json_schema(Drawing))
+        jsonschema.validate(document, build_json_schema(Drawing))
 
 
 def test_a_missing_key_is_named():

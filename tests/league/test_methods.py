@@ -12,20 +12,20 @@ from elastocal.diagnosis.settings import Settings
 from elastocal.errors import InputError
 from elastocal.io.json_files import write_json
 from elastocal.io.storage import read_table, write_table
-from elastocal.loop.diagnosis_tables import diagnosis_facts, step_fit
-from elastocal.loop.schemas import measurements
-from elastocal.loop.whole import cases_in
+from elastocal.loop.diagnosis_tables import refit_step, serialize_diagnosis
+from elastocal.loop.schemas import build_measurements_schema
+from elastocal.loop.whole import read_cases
 from elastocal_proof.league.methods import (
     FRAMES,
     GEOMETRY,
     Method,
-    dealt,
-    entered,
-    fitted_physics,
+    deal_folds,
+    fit_physics,
     load_data_set,
-    mechanism_columns,
-    method_from,
-    rounds,
+    parse_method,
+    predict_held_out,
+    split_rounds,
+    tabulate_mechanisms,
 )
 from elastocal_proof.league.schemas import ENTRIES, FOLDS
 
@@ -40,7 +40,7 @@ def data(kuka, config_folder, tmp_path_factory):
 def test_every_pose_is_held_out_once_in_folds_of_one_size_and_blocks_are_neighbours(
     data,
 ):
-    found = dealt(build_measurements(data.columns), 5, np.random.default_rng(2))
+    found = deal_folds(build_measurements(data.columns), 5, np.random.default_rng(2))
     assert len(found["pose"]) == 24
     for split in ("random", "blocks"):
         counts = np.bincount(found[split])
@@ -55,7 +55,9 @@ def test_every_pose_is_held_out_once_in_folds_of_one_size_and_blocks_are_neighbo
 
 def test_a_data_set_comes_back_from_its_files(data, tmp_path):
     write_json(tmp_path / "campaign.json", data.descriptions)
-    write_table(tmp_path / "seen.parquet", measurements(6), [data.columns], {})
+    write_table(
+        tmp_path / "seen.parquet", build_measurements_schema(6), [data.columns], {}
+    )
     write_table(tmp_path / "folds.parquet", FOLDS, [data.dealt], {})
     found = load_data_set(
         tmp_path / "campaign.json",
@@ -71,7 +73,7 @@ def test_a_data_set_comes_back_from_its_files(data, tmp_path):
 @pytest.mark.parametrize("split", ["random", "blocks"])
 def test_the_poses_of_a_fold_are_either_trained_on_or_held_out(data, split):
     held = []
-    for _, training, (test,) in rounds(split, data):
+    for _, training, (test,) in split_rounds(split, data):
         seen, unseen = (set(case.observations.states.pose) for case in (training, test))
         assert not seen & unseen and len(seen | unseen) == 24
         held += unseen
@@ -84,7 +86,7 @@ def test_another_session_is_tested_as_a_whole_by_all_training_poses(
     other = make_data_set(
         tmp_path, kuka, config_folder / "robots", poses=8, seed=3, name="other"
     )
-    ((fold, training, tests),) = rounds("session", data, [other])
+    ((fold, training, tests),) = split_rounds("session", data, [other])
     assert fold == 1 and len(training.observations.states) == 24
     assert [test.campaign.name for test in tests] == ["other"] and len(
         tests[0].observations.states
@@ -99,9 +101,9 @@ def test_frames_alone_have_no_parameters_of_the_robot_and_a_regression_lowers_wh
     kuka, config_folder, tmp_path
 ):
     many = make_data_set(tmp_path, kuka, config_folder / "robots", poses=60)
-    _, training, (held_out,) = next(rounds("random", many))
+    _, training, (held_out,) = next(split_rounds("random", many))
     frames, geometry = (
-        fitted_physics(physics, training) for physics in (FRAMES, GEOMETRY)
+        fit_physics(physics, training) for physics in (FRAMES, GEOMETRY)
     )
     owners = [
         {owner for owner, _ in fitted.parameters} for fitted in (frames, geometry)
@@ -111,7 +113,9 @@ def test_frames_alone_have_no_parameters_of_the_robot_and_a_regression_lowers_wh
         "joint_offset"
     }
     alone, process = (
-        entered(Method(GEOMETRY, name), geometry, training, held_out, "random", 1)
+        predict_held_out(
+            Method(GEOMETRY, name), geometry, training, held_out, "random", 1
+        )
         for name in (None, "gaussian_process")
     )
     assert (residual(process) ** 2).sum() < 0.64 * (residual(alone) ** 2).sum()
@@ -123,13 +127,13 @@ def test_a_regression_that_is_not_there_is_refused_in_one_line():
         InputError,
         match=r"league\.methods\.mine\.regression.*'magic'.*gaussian_process",
     ):
-        method_from(
+        parse_method(
             {"physics": "geometry", "regression": "magic", "words": ""},
             "mine",
             "config.yaml",
         )
     assert (
-        method_from(
+        parse_method(
             {"physics": "frames", "words": "frames only"}, "mine", "config.yaml"
         ).words
         == "frames only"
@@ -137,10 +141,10 @@ def test_a_regression_that_is_not_there_is_refused_in_one_line():
 
 
 def test_each_observation_has_its_pose_target_and_residual(data, tmp_path):
-    fold, training, (held_out,) = next(rounds("blocks", data))
-    columns = entered(
+    fold, training, (held_out,) = next(split_rounds("blocks", data))
+    columns = predict_held_out(
         Method(GEOMETRY),
-        fitted_physics(GEOMETRY, training),
+        fit_physics(GEOMETRY, training),
         training,
         held_out,
         "blocks",
@@ -160,22 +164,22 @@ def test_each_observation_has_its_pose_target_and_residual(data, tmp_path):
 def diagnosed(kuka, config_folder, tmp_path_factory):
     folder = tmp_path_factory.mktemp("diagnosed") / "made"
     make_folder(folder, kuka, table=make_table(kuka, "made", offset_of_joint_3=1e-3))
-    case, _ = cases_in(folder, config_folder / "robots")
+    case, _ = read_cases(folder, config_folder / "robots")
     return case, diagnose(case, Settings(), 1)
 
 
 def test_the_fit_of_a_fold_is_that_which_its_diagnosis_left(diagnosed):
     case, found = diagnosed
-    again = step_fit(case, diagnosis_facts(found)["steps"][-1])
+    again = refit_step(case, serialize_diagnosis(found)["steps"][-1])
     assert [effect.key for effect in again.model.effects] == [
         effect.key for effect in found.final.model.effects
     ]
     np.testing.assert_allclose(again.residual, found.final.residual, atol=2e-8)
-    assert len(fitted_physics(GEOMETRY, case).model.effects) < len(again.model.effects)
+    assert len(fit_physics(GEOMETRY, case).model.effects) < len(again.model.effects)
 
 
 def test_mechanisms_have_their_probability_and_the_share_that_they_explain(diagnosed):
-    columns = mechanism_columns(diagnosed[1], 3)
+    columns = tabulate_mechanisms(diagnosed[1], 3)
     assert set(columns["fold"]) == {3} and columns["mechanism"][0] == "joint_offset"
     # One milliradian where the noise is 60 um: nearly all of the error.
     assert columns["probability"][0] > 0.99 and 0.7 < columns["share"][0] <= 1.0

@@ -6,7 +6,7 @@ import pytest
 from made_leagues import make_results
 
 from elastocal_proof.league.methods import Method
-from elastocal_proof.league.table import league_page, league_table
+from elastocal_proof.league.table import compare_methods, format_league_page
 
 ROBOTS = {"A robot": ["one"], "Another": ["two"]}
 
@@ -33,12 +33,12 @@ MECHANISMS = pd.DataFrame(
 
 
 def written(table):
-    return league_page(table, MECHANISMS, METHODS, {"four": "folder/four.csv"})
+    return format_league_page(table, MECHANISMS, METHODS, {"four": "folder/four.csv"})
 
 
 @pytest.fixture(scope="module")
 def page():
-    return written(league_table(make_results(), ROBOTS, "geometry", 1))
+    return written(compare_methods(make_results(), ROBOTS, "geometry", 1))
 
 
 def test_each_split_has_a_table_in_which_the_best_is_bold(page):
@@ -54,7 +54,9 @@ def test_each_split_has_a_table_in_which_the_best_is_bold(page):
 
 def test_a_split_that_no_data_set_has_is_left_out():
     page = written(
-        league_table(make_results(splits=("random", "session")), ROBOTS, "geometry", 1)
+        compare_methods(
+            make_results(splits=("random", "session")), ROBOTS, "geometry", 1
+        )
     )
     assert (
         "Random poses" in page
@@ -81,6 +83,6 @@ def test_the_page_says_first_how_often_a_diagnosis_leads_and_how_surely(page):
         if key[2] == "geometry"
         for name in ("geometry", "half")
     }
-    table = league_table(twins, ROBOTS, "geometry", 1)
+    table = compare_methods(twins, ROBOTS, "geometry", 1)
     assert "has the smallest RMS error in 0 of 6 rows, in 0 with" in written(table)
     assert "; another has it in 6, in 0 with that confidence." in written(table)

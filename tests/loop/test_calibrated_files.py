@@ -1,8 +1,8 @@
-"""The calibrated robot comes from the tables of a diagnosis as it was fitted, and only
-while all behind it is as it was.
+"""The calibrated robot is restored from the files of a diagnosis as it was fitted, and
+only if no file behind it has changed.
 
-A certificate decides by what is predicted, and its error budget has what each effect
-costs and what a correction leaves.
+A certificate decides by predicted errors; its error budget has the contribution of each
+effect and the errors that a correction leaves.
 """
 
 import hashlib
@@ -27,41 +27,46 @@ from elastocal.application.calibrated import (
     predict_poses,
 )
 from elastocal.io.json_files import read_json
-from elastocal.io.origin import environment
+from elastocal.io.origin import list_versions
 from elastocal.io.records import compute_sha256
-from elastocal.loop.calibrated_files import certificate, error_budget, load_diagnosed
-from elastocal.loop.diagnosis_tables import diagnosis_from
+from elastocal.loop.calibrated_files import (
+    build_certificate,
+    compute_error_budget,
+    load_diagnosed,
+)
+from elastocal.loop.diagnosis_tables import restore_diagnosis
 
 
 def test_the_robot_is_that_of_the_final_fit(checkout):
-    found = load_diagnosed(checkout / "made", ROBOTS, checkout)
+    campaign = load_diagnosed(checkout / "made", ROBOTS, checkout)
     tables = checkout / "results/loop/made"
-    again = diagnosis_from(found.case, read_json(tables / "diagnosis.json"))
-    expected = calibrate_by_fit(again.final, found.case.campaign.robot)
-    assert [e.key for e in found.calibrated.model.effects] == [
+    restored = restore_diagnosis(campaign.case, read_json(tables / "diagnosis.json"))
+    expected = calibrate_by_fit(restored.final, campaign.case.campaign.robot)
+    assert [e.key for e in campaign.calibrated.model.effects] == [
         "joint_compliance",
         "joint_offset@3",
     ]
-    for mine, theirs in zip(
-        found.calibrated.estimate.coefficients,
+    for coefficients, expected_coefficients in zip(
+        campaign.calibrated.estimate.coefficients,
         expected.estimate.coefficients,
         strict=True,
     ):
-        np.testing.assert_allclose(mine, theirs, rtol=1e-6)
-    # What hardly varies together may be off by more than its own thousandth: measured
-    # beside the standard errors.
+        np.testing.assert_allclose(coefficients, expected_coefficients, rtol=1e-6)
+    # A covariance close to zero is compared with the standard errors instead of with
+    # itself.
     errors = np.sqrt(np.diag(expected.covariance))
-    off = np.abs(found.calibrated.covariance - expected.covariance)
+    difference = np.abs(campaign.calibrated.covariance - expected.covariance)
     assert (
-        off <= 1e-3 * np.abs(expected.covariance) + 1e-6 * np.outer(errors, errors)
+        difference
+        <= 1e-3 * np.abs(expected.covariance) + 1e-6 * np.outer(errors, errors)
     ).all()
-    assert (found.calibrated.noise.joint_rad >= expected.noise.joint_rad).all()
-    assert found.calibrated.scope.frame == (
-        "robot" if found.case.model.fitted_frames else "base"
+    assert (campaign.calibrated.noise.joint_rad >= expected.noise.joint_rad).all()
+    assert campaign.calibrated.scope.frame == (
+        "robot" if campaign.case.model.fitted_frames else "base"
     )
-    assert found.verdict.campaign == found.name == "made"
-    assert found.calibrated.scope.form_m == pytest.approx(
-        found.verdict.accuracy.form_m, rel=1e-9
+    assert campaign.verdict.campaign == campaign.name == "made"
+    assert campaign.calibrated.scope.form_m == pytest.approx(
+        campaign.verdict.accuracy.form_m, rel=1e-9
     )
 
 
@@ -69,7 +74,7 @@ def test_the_regression_comes_back_and_physics_alone_has_its_own_accuracy(
     regressed_checkout,
 ):
     whole = load_diagnosed(regressed_checkout / "smooth", ROBOTS, regressed_checkout)
-    physics = whole.by_physics()
+    physics = whole.without_regression()
     stated = whole.verdict
     heldout = whole.verdict.heldout
     assert heldout.delivered.rms_m < 0.6 * heldout.after.rms_m
@@ -78,17 +83,18 @@ def test_the_regression_comes_back_and_physics_alone_has_its_own_accuracy(
         and physics.verdict.heldout.delivered == heldout.after
     )
     assert physics.verdict.accuracy == stated.physics.accuracy != stated.accuracy
-    for found in (whole, physics):
-        again = predict_campaign_accuracy(found.calibrated)
-        assert again.rms_m == pytest.approx(found.verdict.accuracy.rms_m, rel=1e-3)
-        assert again.form_m == pytest.approx(found.verdict.accuracy.form_m, rel=1e-6)
-    # What it is predicted to miss is by folds with fewer poses, and no less than what
-    # it missed.
+    for campaign in (whole, physics):
+        accuracy = predict_campaign_accuracy(campaign.calibrated)
+        expected = campaign.verdict.accuracy
+        assert accuracy.rms_m == pytest.approx(expected.rms_m, rel=1e-3)
+        assert accuracy.form_m == pytest.approx(expected.form_m, rel=1e-6)
+    # The prediction comes from folds with fewer poses, so it is no smaller than the
+    # observed error.
     missed = np.sqrt(heldout.delivered.rms_m**2 - 3 * NOISE_M**2)
     assert missed < stated.accuracy.rms_m < 3.0 * missed < stated.physics.accuracy.rms_m
 
 
-def test_it_says_what_code_data_and_environment_made_it(checkout):
+def test_the_origin_names_code_data_and_environment(checkout):
     origin = load_diagnosed(checkout / "made", ROBOTS, checkout).origin
 
     def digest(value):
@@ -105,7 +111,7 @@ def test_it_says_what_code_data_and_environment_made_it(checkout):
         "commit": "c0ffee",
         "code_sha256": digest({ENGINE: compute_sha256(checkout / ENGINE)}),
         "data_sha256": digest(sorted(files.items())),
-        "environment": environment(checkout),
+        "environment": list_versions(checkout),
     }
 
 
@@ -129,7 +135,7 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
-def test_a_campaign_that_has_changed_since_is_refused_be_it_in_a_held_out_row(
+def test_a_campaign_that_changed_since_its_diagnosis_is_refused(
     checkout, tmp_path, change
 ):
     shutil.copytree(checkout / "made", tmp_path / "changed")
@@ -162,16 +168,16 @@ def test_results_of_another_engine_are_refused(checkout, tmp_path):
 def test_a_certificate_follows_the_prediction_if_enough_configurations_judge(
     checkout, share, judged, decision
 ):
-    found = load_diagnosed(checkout / "made", ROBOTS, checkout)
-    found = replace(
-        found,
+    campaign = load_diagnosed(checkout / "made", ROBOTS, checkout)
+    campaign = replace(
+        campaign,
         verdict=replace(
-            found.verdict,
-            heldout=replace(found.verdict.heldout, configurations=judged),
+            campaign.verdict,
+            heldout=replace(campaign.verdict.heldout, configurations=judged),
         ),
     )
-    tolerance_m = share * found.verdict.accuracy.rms_m
-    conformity = certificate(found, tolerance_m, 0.05)["conformity"]
+    tolerance_m = share * campaign.verdict.accuracy.rms_m
+    conformity = build_certificate(campaign, tolerance_m, 0.05)["conformity"]
     assert conformity["decision"] == decision
     assert [
         line.startswith("too few: 3 configurations")
@@ -179,8 +185,8 @@ def test_a_certificate_follows_the_prediction_if_enough_configurations_judge(
     ] == [True] * (judged == 3)
 
 
-def rms(one, other):
-    return np.sqrt(((one - other) ** 2).sum(axis=1).mean())
+def rms_distance(positions, references):
+    return np.sqrt(((positions - references) ** 2).sum(axis=1).mean())
 
 
 @pytest.fixture
@@ -191,16 +197,12 @@ def states(fanuc):
     return fanuc.reported_angles(rng.uniform(0.6 * low, 0.6 * high, (60, 6))), wrench
 
 
-def test_each_line_of_the_budget_is_what_the_robot_misses_without_that_effect(
-    fanuc, states
-):
+def test_each_entry_of_the_budget_is_the_error_without_that_effect(fanuc, states):
     calibrated = make_calibrated_robot(fanuc, *USUAL)
-    found, (whole, _) = (
-        error_budget(calibrated, *states),
-        predict_poses(calibrated, *states),
-    )
-    assert found["uncorrected"] == pytest.approx(
-        rms(whole, compute_nominal_poses(fanuc, states[0])[0])
+    budget = compute_error_budget(calibrated, *states)
+    whole, _ = predict_poses(calibrated, *states)
+    assert budget["uncorrected"] == pytest.approx(
+        rms_distance(whole, compute_nominal_poses(fanuc, states[0])[0])
     )
     for name in ("joint_offset", "link_geometry", "joint_compliance", "link_weight"):
         values = tuple(
@@ -212,25 +214,28 @@ def test_each_line_of_the_budget_is_what_the_robot_misses_without_that_effect(
         without = replace(
             calibrated, estimate=replace(calibrated.estimate, coefficients=values)
         )
-        assert found[name] == pytest.approx(
-            rms(whole, predict_poses(without, *states)[0])
+        assert budget[name] == pytest.approx(
+            rms_distance(whole, predict_poses(without, *states)[0])
         )
-    names = list(found)
+    names = list(budget)
     assert names[0] == "uncorrected" and names[-2:] == [
         "uncertainty of the parameters",
         "repeatability",
     ]
-    middle = [found[name] for name in names[1:-2]]
-    assert middle == sorted(middle, reverse=True)
+    contributions = [budget[name] for name in names[1:-2]]
+    assert contributions == sorted(contributions, reverse=True)
 
 
-def test_springs_of_the_robot_file_cost_what_they_give_under_load(fanuc, states):
+def test_the_compliances_of_the_robot_file_contribute_their_deflection(fanuc, states):
     calibrated = make_calibrated_robot(fanuc, "joint_offset@2", identified=False)
     rigid = replace(
         calibrated, model=replace(calibrated.model, nominal_compliance=np.zeros(6))
     )
-    expected = rms(*(predict_poses(each, *states)[0] for each in (calibrated, rigid)))
+    expected = rms_distance(
+        predict_poses(calibrated, *states)[0], predict_poses(rigid, *states)[0]
+    )
     assert (
-        error_budget(calibrated, *states)["joint_compliance"] == pytest.approx(expected)
+        compute_error_budget(calibrated, *states)["joint_compliance"]
+        == pytest.approx(expected)
         and expected > 1e-5
     )

@@ -1,4 +1,4 @@
-"""What a campaign leaves out is written down for the steps that follow."""
+"""Reading a campaign adds the defaults of optional keys for the later steps."""
 
 import yaml
 from made_folders import make_folder
@@ -9,7 +9,7 @@ from elastocal.loop.loading import REMAINDERS, load_campaign
 from elastocal.residual_model.regressions import REGRESSIONS
 
 
-def test_descriptions_hold_what_a_campaign_may_leave_out(kuka, config_folder, tmp_path):
+def test_descriptions_have_the_defaults_of_optional_keys(kuka, config_folder, tmp_path):
     folder = make_folder(tmp_path / "campaign", kuka)
     path = folder / "campaign.yaml"
     document = yaml.safe_load(path.read_text(encoding="utf-8"))
@@ -19,8 +19,8 @@ def test_descriptions_hold_what_a_campaign_may_leave_out(kuka, config_folder, tm
     descriptions, _, held_out = load_campaign(
         read_campaign_folder(folder.as_posix(), config_folder / "robots")
     )
-    said = descriptions["campaign"]
-    assert (said["declared"], said["compliance"], said["holdout"]) == (
+    campaign = descriptions["campaign"]
+    assert (campaign["declared"], campaign["compliance"], campaign["holdout"]) == (
         [],
         "nominal",
         {"fraction": 0.3, "seed": 1},
@@ -28,9 +28,7 @@ def test_descriptions_hold_what_a_campaign_may_leave_out(kuka, config_folder, tm
     assert len(held_out)
 
 
-def test_a_regression_that_neither_the_package_nor_a_plug_in_has_is_refused(
-    kuka, config_folder, tmp_path
-):
+def test_an_unknown_regression_is_refused(kuka, config_folder, tmp_path):
     folder = make_folder(tmp_path / "campaign", kuka)
     path = folder / "campaign.yaml"
     document = yaml.safe_load(path.read_text(encoding="utf-8"))
@@ -40,5 +38,5 @@ def test_a_regression_that_neither_the_package_nor_a_plug_in_has_is_refused(
         load_campaign(read_campaign_folder(folder.as_posix(), config_folder / "robots"))
 
 
-def test_the_names_that_remainder_may_have_are_those_of_the_regressions():
+def test_remainder_may_name_every_regression():
     assert set(REMAINDERS) == {"auto", "none", *REGRESSIONS}

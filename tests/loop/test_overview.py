@@ -1,4 +1,5 @@
-"""What is said of a campaign before it is diagnosed."""
+"""The overview of a campaign states what was read, what is testable and what is
+suspicious."""
 
 from dataclasses import replace
 
@@ -7,58 +8,62 @@ from analysed_robots import ROBOTS
 from made_folders import make_folder, make_table
 from small_data import service_arm_folder
 
-from elastocal.loop.overview import overview
+from elastocal.loop.overview import inspect_campaign
 
 
 @pytest.fixture(scope="module")
-def found(kuka, tmp_path_factory):
-    return overview(make_folder(tmp_path_factory.mktemp("o") / "made", kuka), ROBOTS)
+def overview(kuka, tmp_path_factory):
+    return inspect_campaign(
+        make_folder(tmp_path_factory.mktemp("o") / "made", kuka), ROBOTS
+    )
 
 
-def said(found, words):
-    return [sentence for sentence in found.attention if words in sentence]
+def find_sentences(overview, phrase):
+    return [sentence for sentence in overview.attention if phrase in sentence]
 
 
-def test_what_was_read_and_can_be_tested_stands_in_the_table_and_what_is_little_below(
-    found,
+def test_the_table_states_what_was_read_and_what_is_testable(
+    overview,
 ):
-    rows = dict(found.rows)
+    rows = dict(overview.rows)
     assert (
-        found.diagnosable
-        and found.testable > 20
-        and rows["testable"].startswith(f"{found.testable} candidate")
+        overview.diagnosable
+        and overview.testable > 20
+        and rows["testable"].startswith(f"{overview.testable} candidate")
     )
     assert "6 joints" in rows["read"] and any(
-        "position of 3DoF, 6DoF in the base frame" in words for _, words in found.rows
+        "position of 3DoF, 6DoF in the base frame" in text for _, text in overview.rows
     )
-    assert any(" not testable: " in words for _, words in found.rows)
+    assert any(" not testable: " in text for _, text in overview.rows)
     assert 1.0 < float(rows["noise"].split(" ")[0]) < 1000.0
-    assert said(found, "one load beside none") and said(
-        found, "held-out poses say little"
+    assert find_sentences(overview, "one load beside none") and find_sentences(
+        overview, "held-out poses say little"
     )
-    assert not said(found, "poses are few")
+    assert not find_sentences(overview, "poses are few")
 
 
-def test_a_compliance_that_comes_out_negative_is_said(kuka, tmp_path):
-    """What the declared model lacks hides behind it, and behind all others."""
+def test_a_negative_compliance_is_reported(kuka, tmp_path):
+    """It means that the declared model lacks an effect."""
     table = make_table(
         replace(kuka, compliance=kuka.compliance * [1.0, 1.0, -1.0, 1.0, 1.0, 1.0]),
         "made",
     )
-    found = overview(make_folder(tmp_path / "made", kuka, table=table), ROBOTS)
-    assert said(found, "the compliance of joint 3 comes out negative")
+    overview = inspect_campaign(
+        make_folder(tmp_path / "made", kuka, table=table), ROBOTS
+    )
+    assert find_sentences(overview, "the compliance of joint 3 comes out negative")
 
 
-def test_parameters_that_are_many_for_the_poses_are_said_and_how_many_poses_it_takes(
+def test_a_warning_of_few_poses_states_how_many_are_needed(
     tmp_path,
 ):
-    (few,) = said(
-        overview(service_arm_folder(tmp_path / "made", 1), ROBOTS), "poses are few"
+    (few,) = find_sentences(
+        inspect_campaign(service_arm_folder(tmp_path / "made", 1), ROBOTS),
+        "poses are few",
     )
-    words = few.replace(",", "").replace(":", "").split(" ")
-    parameters, effective, numbers = (
-        int(words[place])
-        for place in (5, words.index("about") + 1, words.index("by") + 1)
-    )
+    tokens = few.replace(",", "").replace(":", "").split(" ")
+    parameters = int(tokens[5])
+    effective = int(tokens[tokens.index("about") + 1])
+    numbers = int(tokens[tokens.index("by") + 1])
     assert few.startswith("24 poses") and numbers == 72 and 9 <= effective < parameters
     assert int(few.split("Measure about ")[1].split(" ")[0]) > 48

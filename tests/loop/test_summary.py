@@ -1,4 +1,4 @@
-"""All campaigns on one page: rows, counted verdicts, and errors by hand."""
+"""The summary has a row for each campaign and session, with errors computed by hand."""
 
 from dataclasses import replace
 
@@ -7,18 +7,18 @@ import pandas as pd
 import pytest
 from made_loop_tables import effect_entry, make_verdict
 
-from elastocal.loop.summary import campaign_rows
+from elastocal.loop.summary import tabulate_campaigns
 
 
-def verdict(word, *effects):
+def make_campaign_verdict(kind, *effects):
     missing = [
         replace(effect_entry(name), joints=tuple(joints)) for name, joints in effects
     ]
-    return make_verdict(word, missing)
+    return make_verdict(kind, missing)
 
 
-def errors(before, after=None, pose=None, repeat=None, session=0):
-    """Held-out rows with errors along x of so many millimetres."""
+def make_residuals(before, after=None, pose=None, repeat=None, session=0):
+    """Return held-out rows with errors along x, mm."""
     before = np.asarray(before, float)
     after = before if after is None else np.asarray(after, float)
     count = len(before)
@@ -36,42 +36,48 @@ def errors(before, after=None, pose=None, repeat=None, session=0):
     return pd.DataFrame(table)
 
 
-def test_errors_are_distances_in_millimetres_and_repeats_of_a_state_are_averaged_before():
+def test_errors_are_distances_of_averaged_repeats_in_millimetres():
     residuals = {
-        "one": errors([1.0, -2.0, 3.0], [0.1, 0.1, -0.4]),
-        "two": errors([1.5, -0.5, 0.25], pose=[4, 4, 7], repeat=[0, 1, 0]),
+        "one": make_residuals([1.0, -2.0, 3.0], [0.1, 0.1, -0.4]),
+        "two": make_residuals([1.5, -0.5, 0.25], pose=[4, 4, 7], repeat=[0, 1, 0]),
     }
-    one, two = campaign_rows(
-        {name: verdict("named") for name in residuals}, residuals, {}, 1
+    first, second = tabulate_campaigns(
+        {name: make_campaign_verdict("named") for name in residuals}, residuals, {}, 1
     ).itertuples()
-    assert (one.campaign, one.session, one.poses) == ("one", 0, 3)
-    assert (one.before_mean_mm, one.before_rms_mm, one.before_max_mm) == pytest.approx(
-        (2.0, np.sqrt(14 / 3), 3.0)
-    )
-    assert one.before_p95_mm == pytest.approx(2.9)
-    assert (one.after_mean_mm, one.after_rms_mm, one.after_max_mm) == pytest.approx(
-        (0.2, np.sqrt(0.06), 0.4)
-    )
-    # Noise that cancels between repeats is gone; the mean of 1.5 and -0.5 is left.
+    assert (first.campaign, first.session, first.poses) == ("one", 0, 3)
     assert (
-        two.poses == 2
-        and two.before_mean_mm == pytest.approx(0.375)
-        and two.before_max_mm == pytest.approx(0.5)
+        first.before_mean_mm,
+        first.before_rms_mm,
+        first.before_max_mm,
+    ) == pytest.approx((2.0, np.sqrt(14 / 3), 3.0))
+    assert first.before_p95_mm == pytest.approx(2.9)
+    assert (
+        first.after_mean_mm,
+        first.after_rms_mm,
+        first.after_max_mm,
+    ) == pytest.approx((0.2, np.sqrt(0.06), 0.4))
+    # The error of the repeats is that of the mean of 1.5 and -0.5.
+    assert (
+        second.poses == 2
+        and second.before_mean_mm == pytest.approx(0.375)
+        and second.before_max_mm == pytest.approx(0.5)
     )
 
 
-def test_folds_of_one_campaign_are_one_row_with_all_their_poses_and_counted_verdicts():
+def test_the_folds_of_a_campaign_are_one_row_with_all_poses_and_counted_verdicts():
     verdicts = {
-        "fold 1": verdict("named", ("joint_offset", (3,))),
-        "alone": verdict("adequate"),
-        "fold 2": verdict("class", ("joint_offset", (3,)), ("payload", ())),
-        "fold 3": verdict("named", ("joint_offset", (3,))),
+        "fold 1": make_campaign_verdict("named", ("joint_offset", (3,))),
+        "alone": make_campaign_verdict("adequate"),
+        "fold 2": make_campaign_verdict(
+            "class", ("joint_offset", (3,)), ("payload", ())
+        ),
+        "fold 3": make_campaign_verdict("named", ("joint_offset", (3,))),
     }
     residuals = {
-        name: errors([1.0 + k, 1.0 + k], pose=[2 * k, 2 * k + 1])
+        name: make_residuals([1.0 + k, 1.0 + k], pose=[2 * k, 2 * k + 1])
         for k, name in enumerate(verdicts)
     }
-    table = campaign_rows(
+    table = tabulate_campaigns(
         verdicts, residuals, {"all folds": ["fold 1", "fold 2", "fold 3"]}, 1
     ).set_index("campaign")
     assert list(table.index) == ["alone", "all folds"]

@@ -1,5 +1,5 @@
-"""The whole loop in one call: every kind of verdict, and a wall before the held-out
-poses."""
+"""The whole loop in one call reaches every kind of verdict, and the diagnosis never sees
+held-out measurements."""
 
 import json
 from dataclasses import replace
@@ -14,32 +14,31 @@ from small_data import service_arm_folder
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.settings import Settings
-from elastocal.loop.whole import cases_in, diagnosed
+from elastocal.loop.whole import diagnose_folder, read_cases
 
-# Loads in both senses, for what comes with the load and is in no catalogue.
+# Loads in both senses, which reveal an error that is odd in the load.
 BOTH_SENSES = replace(PLAN, poses=40, ladder=(0, 1, -1))
 USUAL = replace(PLAN, poses=30)
 
 
-def offset_and_harmonic(table):
-    """Joint 3 half a milliradian beyond what it reports, and a wave of joint 5."""
+def add_offset_and_harmonic(table):
+    """Add an offset of half a milliradian to joint 3, and a harmonic error to joint 5."""
     return table | {
         "q3": table["q3"] - 5e-4,
         "q5": table["q5"] - 1e-3 * np.cos(2 * table["q5"]),
     }
 
 
-def foreign(table):
-    """Joints 1 and 2 displaced by functions of other joints' angles, odd in the
-    load."""
+def add_unknown_error(table):
+    """Displace joints 1 and 2 by functions of the other joints' angles that are odd in
+    the load; the catalogue has no such effect."""
     q1 = 2e-4 * table["load"] * np.cos(1.5 * table["q2"] + table["q3"])
     q2 = 2e-4 * table["load"] * np.sin(table["q1"] + 1.5 * table["q3"])
     return table | {"q1": table["q1"] - q1, "q2": table["q2"] - q2}
 
 
-def hidden(table):
-    """Unloaded, each target once in a pose: beside a noise of centimetres nothing
-    shows."""
+def keep_unloaded(table):
+    """Keep one unloaded measurement of each target in each pose."""
     keys = np.column_stack(
         [table["pose"], np.unique(table["target"], return_inverse=True)[1]]
     )
@@ -59,33 +58,32 @@ NOTHING_KNOWN = {
 }
 KINDS = {
     "adequate": (lambda table: table, USUAL, {}),
-    "several": (offset_and_harmonic, USUAL, {}),
-    "unexplained": (foreign, BOTH_SENSES, {}),
-    "not_testable": (hidden, PLAN, NOTHING_KNOWN),
+    "several": (add_offset_and_harmonic, USUAL, {}),
+    "unexplained": (add_unknown_error, BOTH_SENSES, {}),
+    "not_testable": (keep_unloaded, PLAN, NOTHING_KNOWN),
     "named": (lambda table: table | {"q3": -table["q3"]}, PLAN, {}),
 }
 NAMES = {"several": ["joint_offset", "transmission_harmonic"]}
 
 
-def in_order(table):
-    """Pose by pose, as people measure."""
+def sort_by_pose(table):
+    """Sort measurements pose by pose, as people measure."""
     order = np.lexsort((table["repeat"], table["load"], table["pose"]))
     return {name: table[name][order] for name in table}
 
 
-def folder_of(path, robot, kind):
+def make_kind(path, robot, kind):
     change, plan, settings = KINDS[kind]
-    table = in_order(change(make_table(robot, "made", seed=3, plan=plan)))
+    table = sort_by_pose(change(make_table(robot, "made", seed=3, plan=plan)))
     return make_folder(path / "made", robot, table=table, **settings)
 
 
 @pytest.mark.parametrize("kind", slow_but(["several", "named"], KINDS))
-def test_verdict_is(kind, kuka, tmp_path):
-    verdict = diagnosed(folder_of(tmp_path, kuka, kind), ROBOTS, 1)
+def test_the_loop_reaches_each_kind_of_verdict(kind, kuka, tmp_path):
+    verdict = diagnose_folder(make_kind(tmp_path, kuka, kind), ROBOTS, 1)
     json.dumps(verdict, allow_nan=False)
     if kind == "named":
-        # What is left of measurements that are wrong in themselves is no statement on
-        # the model.
+        # The residual of faulty measurements says nothing about the model.
         (effect,) = verdict["effects"]
         assert (effect["name"], effect["family"], verdict["verdict"]) == (
             "wrong_sign",
@@ -121,43 +119,55 @@ def test_verdict_is(kind, kuka, tmp_path):
 
 
 def test_no_step_before_the_judgement_depends_on_held_out_measurements(kuka, tmp_path):
-    """Held-out measurements a metre off, or at other loads and angles, change nothing
-    of the diagnosis, to the last digit."""
-    folder = folder_of(tmp_path, kuka, "several")
-    case, held_out = cases_in(folder, ROBOTS)
-    unseen = set(
+    """Shift held-out measurements by a metre and change their loads and angles: the
+    diagnosis stays the same to the last digit."""
+    folder = make_kind(tmp_path, kuka, "several")
+    case, held_out = read_cases(folder, ROBOTS)
+    held_out_poses = set(
         zip(
             held_out.campaign.measurements.session,
             held_out.campaign.measurements.pose,
             strict=True,
         )
     )
-    table = in_order(offset_and_harmonic(make_table(kuka, "made", seed=3, plan=USUAL)))
-    mine = np.array(
-        [(0, pose) in unseen or (1, pose) in unseen for pose in table["pose"]]
+    table = sort_by_pose(
+        add_offset_and_harmonic(make_table(kuka, "made", seed=3, plan=USUAL))
     )
-    assert 0 < mine.sum() < len(mine)
+    is_held_out = np.array(
+        [
+            (0, pose) in held_out_poses or (1, pose) in held_out_poses
+            for pose in table["pose"]
+        ]
+    )
+    assert 0 < is_held_out.sum() < len(is_held_out)
     for name, change in (
         ("x", 1.0),
         ("z", -0.5),
         ("q2", 0.3),
         ("fx", 300.0 * (table["load"] != 0)),
     ):
-        table[name] = table[name] + change * mine
-    spoilt_folder = make_folder(tmp_path / "spoilt" / "made", kuka, table=table)
-    spoilt, spoilt_held_out = cases_in(spoilt_folder, ROBOTS)
+        table[name] = table[name] + change * is_held_out
+    altered_folder = make_folder(tmp_path / "altered" / "made", kuka, table=table)
+    altered, altered_held_out = read_cases(altered_folder, ROBOTS)
     assert (
         np.abs(
-            spoilt_held_out.campaign.measurements.position
+            altered_held_out.campaign.measurements.position
             - held_out.campaign.measurements.position
         ).max()
         > 0.9
     )
-    one, other = (diagnose(each, Settings(), 1) for each in (case, spoilt))
-    assert one.document == other.document
-    for mine, theirs in zip(one.steps, other.steps, strict=True):
-        np.testing.assert_array_equal(mine.fitted.covariance, theirs.fitted.covariance)
-    verdicts = [judge(one, part, 1).document for part in (held_out, spoilt_held_out)]
+    diagnosis = diagnose(case, Settings(), 1)
+    altered_diagnosis = diagnose(altered, Settings(), 1)
+    assert diagnosis.document == altered_diagnosis.document
+    for step, altered_step in zip(
+        diagnosis.steps, altered_diagnosis.steps, strict=True
+    ):
+        np.testing.assert_array_equal(
+            step.fitted.covariance, altered_step.fitted.covariance
+        )
+    verdicts = [
+        judge(diagnosis, poses, 1).document for poses in (held_out, altered_held_out)
+    ]
     assert verdicts[0]["heldout"] != verdicts[1]["heldout"]
     different = {key for key in verdicts[0] if verdicts[0][key] != verdicts[1][key]}
     assert different <= {"heldout", "effects", "warnings"}
@@ -165,10 +175,10 @@ def test_no_step_before_the_judgement_depends_on_held_out_measurements(kuka, tmp
 
 @pytest.mark.slow
 def test_a_calibration_by_few_poses_is_no_worse_than_none(tmp_path):
-    """Without priors these end at 1.12 times the error of frames alone."""
+    """Without priors, the error would be 1.12 times that of fitted frames alone."""
     ratios = []
     for seed in range(4):
-        training, held_out = cases_in(
+        training, held_out = read_cases(
             service_arm_folder(tmp_path / f"arm{seed}", seed), ROBOTS
         )
         heldout = judge(diagnose(training, Settings(), 1), held_out, 1).document[

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from analysed_robots import ROBOTS
 
-from elastocal_proof.plant.arm import arm_from_file
-from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.physical_robot import specimen
-from elastocal_proof.plant.sizing import Yardstick
+from elastocal_proof.plant.arm import read_arm
+from elastocal_proof.plant.campaigns import Design, draw_schedule
+from elastocal_proof.plant.simulated_robot import draw_specimen
+from elastocal_proof.plant.sizing import NoncentralityModel
 
 
 @pytest.fixture(scope="session", params=["kuka", "fanuc", "abb", "gp180", "iiwa14"])
@@ -20,23 +20,23 @@ def name(request):
 
 @pytest.fixture(scope="session")
 def arm(name):
-    return arm_from_file(ROBOTS / f"{name}.yaml")
+    return read_arm(ROBOTS / f"{name}.yaml")
 
 
 @pytest.fixture(scope="session")
 def fanuc_arm():
-    return arm_from_file(ROBOTS / "fanuc.yaml")
+    return read_arm(ROBOTS / "fanuc.yaml")
 
 
 @pytest.fixture(scope="session")
 def fanuc_specimen(fanuc_arm):
-    return specimen(fanuc_arm, 4)
+    return draw_specimen(fanuc_arm, 4)
 
 
 @pytest.fixture(scope="session")
 def weightless(fanuc_arm):
     """The same, of an arm that weighs nothing: what only its loads and defects do."""
-    return specimen(fanuc_arm, 4, weighs=False)
+    return draw_specimen(fanuc_arm, 4, weighs=False)
 
 
 @pytest.fixture(scope="session")
@@ -47,14 +47,16 @@ def small():
 
 @pytest.fixture(scope="session")
 def schedule(fanuc_arm, small):
-    return schedule_of(fanuc_arm, small, 2)
+    return draw_schedule(fanuc_arm, small, 2)
 
 
 @pytest.fixture(scope="session")
 def yardstick(fanuc_specimen, schedule):
     # As slow as a campaign of usual length, in which a stand that is knocked is so
     # between two of its poses.
-    return Yardstick(fanuc_specimen, replace(schedule, time_s=3.0 * schedule.time_s))
+    return NoncentralityModel(
+        fanuc_specimen, replace(schedule, time_s=3.0 * schedule.time_s)
+    )
 
 
 @pytest.fixture

@@ -11,11 +11,11 @@ from support import refused
 
 from elastocal_proof.plant.arm import (
     LinkMass,
-    arm_from_document,
-    arm_from_file,
-    rotation_vector,
-    true_masses,
-    turned,
+    build_arm,
+    draw_true_masses,
+    read_arm,
+    to_rotation_matrix,
+    to_rotation_vector,
 )
 
 CHAIN = "Tz(l1) Rz(q1) Tx(-l2) [A] Rx(90deg) Ty(0.5) Ry(-q2) Tz(0.3) [B]"
@@ -34,13 +34,13 @@ def document(chain=CHAIN, joints=2, **more):
     } | more
 
 
-ARM = arm_from_document(document())
+ARM = build_arm(document())
 
 
 def test_a_chain_is_cut_into_stretches_at_its_joints():
-    column, link, flange = ARM.stretches
+    column, link, flange = ARM.links
     np.testing.assert_allclose(
-        [s.vector_m for s in ARM.stretches],
+        [s.vector_m for s in ARM.links],
         [[0, 0, 0.4], [-0.2, 0, 0.5], [0, 0, 0.3]],
         atol=1e-15,
     )
@@ -73,7 +73,7 @@ def test_an_arm_that_the_plant_cannot_move_or_whose_controller_shows_other_angle
 ):
     shown = {"reported_joints": {"offset_deg": [0, 90]}} if chain == CHAIN else {}
     with refused("my.yaml", *(["reported_joints"] if shown else ["chain", "R.("])):
-        arm_from_document(document(chain, **shown), "my.yaml")
+        build_arm(document(chain, **shown), "my.yaml")
 
 
 def test_masses_and_gravity_are_as_the_file_declares_them_or_of_the_usual_kind():
@@ -81,7 +81,7 @@ def test_masses_and_gravity_are_as_the_file_declares_them_or_of_the_usual_kind()
         {"link": 0, "mass_kg": 5, "centre_m": [0, 0, 1]},
         {"link": 2, "mass_kg": 7.5, "centre_m": [0.1, 0.2, 0.3], "relative_std": 0.02},
     ]
-    arm = arm_from_document(document(masses=entries, gravity_m_s2=[9.8, 0, 0]))
+    arm = build_arm(document(masses=entries, gravity_m_s2=[9.8, 0, 0]))
     assert [(m.link, m.mass_kg, m.centre_m, m.relative_std) for m in arm.masses] == [
         (0, 5.0, (0.0, 0.0, 1.0), 0.1),
         (2, 7.5, (0.1, 0.2, 0.3), 0.02),
@@ -93,7 +93,7 @@ def test_masses_and_gravity_are_as_the_file_declares_them_or_of_the_usual_kind()
     ) == (False, True)
     # Of the arm in the foot and in the carousel with its motors; each link behind it
     # weighs half of the one before.
-    usual = arm_from_file(ROBOTS / "kuka.yaml").masses
+    usual = read_arm(ROBOTS / "kuka.yaml").masses
     mass = np.array([m.mass_kg for m in usual])
     assert [m.link for m in usual] == list(range(7)) and {
         m.relative_std for m in usual
@@ -116,21 +116,23 @@ def test_rotations_are_pinocchios_and_survive_the_way_there_and_back_up_to_a_hal
     )
     vector = angle[:, None] * axis
     np.testing.assert_allclose(
-        turned(vector), [pin.exp3(v) for v in vector], atol=1e-12
+        to_rotation_matrix(vector), [pin.exp3(v) for v in vector], atol=1e-12
     )
-    np.testing.assert_allclose(rotation_vector(turned(vector)), vector, atol=1e-9)
+    np.testing.assert_allclose(
+        to_rotation_vector(to_rotation_matrix(vector)), vector, atol=1e-9
+    )
 
 
 def test_a_file_without_compliances_and_limits_is_of_an_arm_of_usual_ones():
     described = document()
     del described["compliance_urad_per_Nm"], described["joint_limits_deg"]
-    arm = arm_from_document(described | {"payload_kg": 50})
+    arm = build_arm(described | {"payload_kg": 50})
     reach = np.array([np.hypot(0.2, 0.5) + 0.3, 0.3])
     np.testing.assert_allclose(
         arm.compliance, 2e-3 / (50 * 9.80665 * reach), rtol=1e-12
     )
     np.testing.assert_allclose(arm.limits, [[-2 * np.pi, 2 * np.pi]] * 2)
-    shortest = arm_from_document(
+    shortest = build_arm(
         described | {"payload_kg": 50, "chain": "Rz(q1) Tx(1) Rz(q2) Tx(0.1) [A]"}
     )
     np.testing.assert_allclose(
@@ -166,7 +168,7 @@ def test_centres_off_the_line_move_across_it_alone_and_weights_stay():
         * 100,
     )
     there, moved = (
-        true_masses(arm, np.random.default_rng(3), most, np.random.default_rng(4))
+        draw_true_masses(arm, np.random.default_rng(3), most, np.random.default_rng(4))
         for most in (0.0, largest)
     )
     shift = np.array([m.centre_m for m in moved]) - np.array(

@@ -7,20 +7,20 @@ import numpy as np
 import pytest
 from analysed_robots import ROBOTS
 
-from elastocal_proof.plant.arm import arm_from_file, rotation_vector, turned
+from elastocal_proof.plant.arm import read_arm, to_rotation_matrix, to_rotation_vector
 from elastocal_proof.plant.campaigns import (
-    SLIPS,
+    BLUNDER_KINDS,
     Design,
-    measured_table,
-    schedule_of,
-    with_bad_rows,
+    add_blunders,
+    draw_schedule,
+    simulate_measurements,
 )
-from elastocal_proof.plant.kinds import Defect, with_defects
-from elastocal_proof.plant.physical_robot import Tracker, specimen
+from elastocal_proof.plant.kinds import Defect, apply_defects
+from elastocal_proof.plant.simulated_robot import Tracker, draw_specimen
 
 
 def test_the_default_design_is_a_ladder_at_thirty_poses_with_repeats_on_ten(fanuc_arm):
-    schedule = schedule_of(fanuc_arm, Design(), 1)
+    schedule = draw_schedule(fanuc_arm, Design(), 1)
     assert len(schedule.pose) == 30 * 5 + 10 * 3 * 2
     assert np.unique(schedule.pose).size == 30
     np.testing.assert_allclose(
@@ -40,10 +40,10 @@ def test_the_default_design_is_a_ladder_at_thirty_poses_with_repeats_on_ten(fanu
 def test_a_defect_changes_the_measurements_and_neither_the_schedule_nor_the_noise(
     fanuc_specimen, small
 ):
-    schedule = schedule_of(fanuc_specimen.arm, small, 2)
-    bad = with_defects(fanuc_specimen, [Defect("joint_offset", (2,), 1e-4, 1)])
+    schedule = draw_schedule(fanuc_specimen.arm, small, 2)
+    bad = apply_defects(fanuc_specimen, [Defect("joint_offset", (2,), 1e-4, 1)])
     good_table, bad_table = (
-        measured_table(robot, small, schedule) for robot in (fanuc_specimen, bad)
+        simulate_measurements(robot, small, schedule) for robot in (fanuc_specimen, bad)
     )
     for column in good_table:
         assert (column in ("x", "y", "z", "rx", "ry", "rz")) != np.array_equal(
@@ -59,7 +59,7 @@ def test_a_repeat_comes_from_the_same_side_and_a_ladder_without_moves_from_one(
     fanuc_arm, small
 ):
     for each in (True, False):
-        schedule = schedule_of(fanuc_arm, replace(small, approach_each_load=each), 2)
+        schedule = draw_schedule(fanuc_arm, replace(small, approach_each_load=each), 2)
         for pose in range(small.repeated_poses):
             for load in (0, 1):
                 rows = schedule.sense[(schedule.pose == pose) & (schedule.load == load)]
@@ -74,9 +74,9 @@ def test_in_the_trackers_frame_all_measurements_are_moved_as_one_body(
 ):
     tracker = Tracker(sigma_m=0.0, sigma_rad=0.0, frame_turn=(0.2, 0.1, -0.7))
     robot = replace(fanuc_specimen, tracker=tracker)
-    schedule = schedule_of(fanuc_specimen.arm, small, 2)
+    schedule = draw_schedule(fanuc_specimen.arm, small, 2)
     here, there = (
-        measured_table(robot, replace(small, frame=frame), schedule)
+        simulate_measurements(robot, replace(small, frame=frame), schedule)
         for frame in ("base", "tracker")
     )
     one, other = (
@@ -112,14 +112,14 @@ MAY_CHANGE = {
 
 @pytest.fixture(scope="module")
 def campaign():
-    arm = arm_from_file(ROBOTS / "kuka.yaml")
-    robot = specimen(arm, 4)
-    schedule = schedule_of(arm, DESIGN, 4)
-    return measured_table(robot, DESIGN, schedule), robot, schedule
+    arm = read_arm(ROBOTS / "kuka.yaml")
+    robot = draw_specimen(arm, 4)
+    schedule = draw_schedule(arm, DESIGN, 4)
+    return simulate_measurements(robot, DESIGN, schedule), robot, schedule
 
 
 def planted(campaign, kind, seed, count=3):
-    return with_bad_rows(*campaign, kind, count, np.random.default_rng(seed))
+    return add_blunders(*campaign, kind, count, np.random.default_rng(seed))
 
 
 def changed(before, after):
@@ -132,7 +132,7 @@ def changed(before, after):
     }
 
 
-@pytest.mark.parametrize("kind", SLIPS)
+@pytest.mark.parametrize("kind", BLUNDER_KINDS)
 @pytest.mark.parametrize("seed", range(5))
 def test_a_slip_changes_its_columns_in_its_rows_and_no_others(campaign, kind, seed):
     before = {name: column.copy() for name, column in campaign[0].items()}
@@ -165,12 +165,12 @@ def test_sizes_of_wrong_positions_and_rotations_are_within_what_is_drawn(campaig
         )
         assert 5 * 60e-6 <= away <= 1e5 * 60e-6
         before, then = (
-            turned(np.array([t[f"r{a}"][slip["rows"][0]] for a in "xyz"]))
+            to_rotation_matrix(np.array([t[f"r{a}"][slip["rows"][0]] for a in "xyz"]))
             for t in (campaign[0], turn)
         )
         assert (
             5 * 60e-6 - 1e-9
-            <= np.linalg.norm(rotation_vector(then @ before.T))
+            <= np.linalg.norm(to_rotation_vector(then @ before.T))
             <= np.pi + 1e-9
         )
 

@@ -7,7 +7,7 @@ import pytest
 from catalogue_lists import has_own_test
 
 from elastocal.effects.catalogue import list_bundled_effects
-from elastocal_proof.plant.kinds import KINDS, OUTSIDE, drawn_defect, with_defects
+from elastocal_proof.plant.kinds import KINDS, OUTSIDE, apply_defects, draw_defect
 
 NAMED = sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE))
 
@@ -30,10 +30,10 @@ def test_every_effect_of_the_catalogue_can_be_a_defect():
 def test_a_defect_of_no_size_leaves_the_robot_as_it_was_and_a_plausible_one_does_not(
     yardstick, fanuc_specimen, kind
 ):
-    defect = drawn_defect(kind, fanuc_specimen.arm, 3)
+    defect = draw_defect(kind, fanuc_specimen.arm, 3)
     tiny = replace(defect, size=1e-9 * defect.size)
     small, signal = (
-        yardstick.signal(with_defects(fanuc_specimen, [each]))
+        yardstick.compute_noncentralities(apply_defects(fanuc_specimen, [each]))
         for each in (tiny, defect)
     )
     assert (

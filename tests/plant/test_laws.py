@@ -12,10 +12,10 @@ import numpy as np
 import pandas as pd
 from analysed_robots import ROBOTS
 
-from elastocal_proof.plant.arm import arm_from_file, rotation_vector
-from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.kinds import KINDS, drawn_defect, with_defects
-from elastocal_proof.plant.physical_robot import seen_poses, specimen
+from elastocal_proof.plant.arm import read_arm, to_rotation_vector
+from elastocal_proof.plant.campaigns import Design, draw_schedule
+from elastocal_proof.plant.kinds import KINDS, apply_defects, draw_defect
+from elastocal_proof.plant.simulated_robot import draw_specimen, simulate_poses
 
 GOLDEN = ROBOTS.parents[1] / "tests/golden/plant_defects.csv"
 DESIGN = Design(
@@ -31,17 +31,17 @@ def digest(array):
 
 
 def row_of(name, kind, seed):
-    arm = arm_from_file(ROBOTS / f"{name}.yaml")
-    schedule = schedule_of(arm, DESIGN, seed)
+    arm = read_arm(ROBOTS / f"{name}.yaml")
+    schedule = draw_schedule(arm, DESIGN, seed)
     # As slow as a campaign of usual length, in which a stand that is knocked is so
     # between two of its poses.
     schedule = replace(schedule, time_s=5.0 * schedule.time_s)
-    robot = specimen(arm, seed)
-    defect = drawn_defect(kind, arm, seed)
+    robot = draw_specimen(arm, seed)
+    defect = draw_defect(kind, arm, seed)
     good, bad = (
-        seen_poses(one, schedule) for one in (robot, with_defects(robot, [defect]))
+        simulate_poses(one, schedule) for one in (robot, apply_defects(robot, [defect]))
     )
-    turn = rotation_vector(bad[1] @ np.swapaxes(good[1], -1, -2))
+    turn = to_rotation_vector(bad[1] @ np.swapaxes(good[1], -1, -2))
     known = np.array([*defect.on(robot)[1].values()], float)
     found = {
         "shift_m": digest(bad[0] - good[0]),
@@ -54,9 +54,7 @@ def row_of(name, kind, seed):
 
 
 def test_every_defect_does_what_it_did():
-    arms = {
-        name: arm_from_file(ROBOTS / f"{name}.yaml") for name in ("fanuc", "iiwa14")
-    }
+    arms = {name: read_arm(ROBOTS / f"{name}.yaml") for name in ("fanuc", "iiwa14")}
     rows = [
         (name, kind, seed)
         for name, arm in arms.items()

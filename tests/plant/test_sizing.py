@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from elastocal_proof.blind.cases import find_size
-from elastocal_proof.plant.campaigns import Design, schedule_of
-from elastocal_proof.plant.kinds import KINDS, Defect, drawn_defect, with_defects
-from elastocal_proof.plant.physical_robot import Motion
-from elastocal_proof.plant.sizing import Yardstick
+from elastocal_proof.plant.campaigns import Design, draw_schedule
+from elastocal_proof.plant.kinds import KINDS, Defect, apply_defects, draw_defect
+from elastocal_proof.plant.simulated_robot import Motion
+from elastocal_proof.plant.sizing import NoncentralityModel
 
 
 @pytest.mark.parametrize("target", [10.0, 200.0])
@@ -21,34 +21,36 @@ def test_a_defect_is_sized_to_its_non_centrality(
     yardstick, fanuc_specimen, kind, quantity, target
 ):
     joints = () if kind.startswith("outside") else (2,)
-    defect = replace(drawn_defect(kind, fanuc_specimen.arm, 3), joints=joints)
+    defect = replace(draw_defect(kind, fanuc_specimen.arm, 3), joints=joints)
 
     def robot_of_size(size):
-        return with_defects(fanuc_specimen, [replace(defect, size=size)])
+        return apply_defects(fanuc_specimen, [replace(defect, size=size)])
 
     size = find_size(
         yardstick, robot_of_size, defect.size, target, quantity, KINDS[kind].largest
     )
-    assert yardstick.signal(robot_of_size(size))[quantity] == pytest.approx(
-        target, rel=0.011
-    )
+    assert yardstick.compute_noncentralities(robot_of_size(size))[
+        quantity
+    ] == pytest.approx(target, rel=0.011)
 
 
 def test_a_wrong_force_scale_is_absorbed_at_any_size_but_for_what_the_weights_tell(
     weightless, fanuc_specimen, schedule
 ):
     def scaled(robot):
-        return lambda size: with_defects(robot, [Defect("force_scale", (), size)])
+        return lambda size: apply_defects(robot, [Defect("force_scale", (), size)])
 
     with pytest.raises(ValueError, match="no size found"):
         find_size(
-            Yardstick(weightless, schedule),
+            NoncentralityModel(weightless, schedule),
             scaled(weightless),
             0.02,
             50.0,
             largest=KINDS["force_scale"].largest,
         )
-    yardstick = Yardstick(fanuc_specimen, schedule, declared=fanuc_specimen.arm.masses)
+    yardstick = NoncentralityModel(
+        fanuc_specimen, schedule, declared=fanuc_specimen.arm.masses
+    )
     with pytest.raises(ValueError, match="no size found"):
         find_size(
             yardstick,
@@ -59,11 +61,11 @@ def test_a_wrong_force_scale_is_absorbed_at_any_size_but_for_what_the_weights_te
         )
     # Weights that are known without error would tell the compliances, and these the
     # scale; by poses enough.
-    longer = schedule_of(fanuc_specimen.arm, Design(poses=20), 2)
+    longer = draw_schedule(fanuc_specimen.arm, Design(poses=20), 2)
     exact, open_weights = (
-        Yardstick(fanuc_specimen, longer, declared=masses).signal(
-            scaled(fanuc_specimen)(0.02)
-        )["retained"]
+        NoncentralityModel(
+            fanuc_specimen, longer, declared=masses
+        ).compute_noncentralities(scaled(fanuc_specimen)(0.02))["retained"]
         for masses in ((), fanuc_specimen.arm.masses)
     )
     assert exact > 100 * open_weights
@@ -83,14 +85,16 @@ def test_weights_that_differ_as_declared_are_absorbed_up_to_their_own_cost(
         )
         for masses in (declared, (*declared[:2], heavier, *declared[3:]))
     )
-    signal = Yardstick(nominal, schedule, declared=declared).signal(off)
+    signal = NoncentralityModel(
+        nominal, schedule, declared=declared
+    ).compute_noncentralities(off)
     assert 0.5 < signal["retained"] < 2.0 < 0.01 * signal["raw"]
     # Where this link's weight alone is open, by poses enough. The shoulder feels its
     # mass times its lever; the elbow does not.
-    longer = schedule_of(arm, Design(poses=20), 2)
-    assert Yardstick(nominal, longer, declared=declared[2:3]).signal(off)[
-        "retained"
-    ] == pytest.approx(2.0, rel=0.02)
+    longer = draw_schedule(arm, Design(poses=20), 2)
+    assert NoncentralityModel(
+        nominal, longer, declared=declared[2:3]
+    ).compute_noncentralities(off)["retained"] == pytest.approx(2.0, rel=0.02)
 
 
 def test_the_retained_signal_is_what_a_fit_of_the_compliances_leaves(
@@ -99,21 +103,23 @@ def test_the_retained_signal_is_what_a_fit_of_the_compliances_leaves(
     """By a least-squares fit of the plant's own compliances to the defective
     measurements."""
     defect = Defect("lost_motion", (2,), 7e-5, 3)
-    yardstick = Yardstick(fanuc_specimen, schedule)
-    bad = with_defects(fanuc_specimen, [defect])
-    seen = yardstick.seen_and_left(bad)[0]
+    yardstick = NoncentralityModel(fanuc_specimen, schedule)
+    bad = apply_defects(fanuc_specimen, [defect])
+    seen = yardstick.project_change(bad)[0]
     columns = []
     for joint in range(6):
         softer = fanuc_specimen.compliance * (1 + 0.01 * (np.arange(6) == joint))
         columns.append(
-            yardstick.seen_and_left(replace(fanuc_specimen, compliance=softer))[0]
+            yardstick.project_change(replace(fanuc_specimen, compliance=softer))[0]
         )
     left = (
         seen
         - np.array(columns).T
         @ np.linalg.lstsq(np.array(columns).T, seen, rcond=None)[0]
     )
-    assert yardstick.signal(bad)["retained"] == pytest.approx(left @ left, rel=1e-3)
+    assert yardstick.compute_noncentralities(bad)["retained"] == pytest.approx(
+        left @ left, rel=1e-3
+    )
 
 
 def shifted(robot, shift, turn):
@@ -124,10 +130,10 @@ def shifted(robot, shift, turn):
 def test_a_tracker_farther_away_makes_the_same_shift_weigh_less(weightless, schedule):
     tracker = replace(weightless.tracker, sigma_m=0.0, sigma_m_per_m=1e-5)
     robot = replace(weightless, tracker=tracker)
-    yardstick = Yardstick(robot, schedule)
-    change = yardstick.seen_and_left(shifted(robot, (1e-4, 0.0, 0.0), (0.0, 0.0, 0.0)))[
-        0
-    ]
+    yardstick = NoncentralityModel(robot, schedule)
+    change = yardstick.project_change(
+        shifted(robot, (1e-4, 0.0, 0.0), (0.0, 0.0, 0.0))
+    )[0]
     change = change.reshape(-1, len(robot.arm.points), 6)[..., 0]
     distance = np.linalg.norm(yardstick.poses[0] - np.array(tracker.stand_m), axis=-1)
     np.testing.assert_allclose(change, 10.0 / distance[schedule.training])
@@ -138,7 +144,9 @@ def test_a_free_frame_absorbs_any_motion_as_one_body_and_a_known_one_does_not(
 ):
     bad = shifted(weightless, (1e-4, -2e-4, 5e-5), (2e-5, 1e-5, -3e-5))
     free, known = (
-        Yardstick(weightless, schedule, free_frame=free).signal(bad)
+        NoncentralityModel(
+            weightless, schedule, free_frame=free
+        ).compute_noncentralities(bad)
         for free in (True, False)
     )
     assert free["raw"] == pytest.approx(known["raw"])

@@ -17,7 +17,7 @@ from synthetic import displacements, make_states
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.importers import find_importer
 from elastocal.campaigns.reading import read_campaign, read_robot
-from elastocal.effects.conditions import conditions_of
+from elastocal.effects.conditions import build_conditions
 from elastocal.effects.protocol import Effect
 from elastocal.exchange.controllers import CONTROLLERS, axes_of, targets_of
 from elastocal.io.documents import check_document, read_document
@@ -92,7 +92,7 @@ def test_the_effect_displaces_each_joint_as_its_formula_says(import_example, kuk
     candidates = effect.candidates(sites)
     keys = [candidate.key for candidate in candidates]
     assert keys == [f"hoses@{joint}" for joint in range(1, 7)]
-    conditions = conditions_of(sites, kuka.compliance, states)
+    conditions = build_conditions(sites, kuka.compliance, states)
     (displacement,) = displacements(candidates[2], conditions)
     np.testing.assert_array_equal(displacement[:, 2], states.joint_angles[:, 2] ** 3)
     assert not np.delete(displacement, 2, axis=1).any()

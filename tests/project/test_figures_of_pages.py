@@ -1,15 +1,14 @@
-"""Each figure of a page stands in the table that it is from, and a page has no figure
-without a source.
+"""Each figure on a page is in the table of its source, and each figure has a source.
 
-CI replaces the copies of tables in docs by those of its own run before it runs these
-tests, so a page is compared with the run.
+`figures_of_pages.yaml` lists the figures: for each page and source the words of the page
+and the table (by the heading above it), row and column that hold their numbers, or a
+sentence (no column). Sources are pages and CSV files that commands write into docs
+(`make pictures`, the blind benchmark, the league), or the table of the page itself if
+its run takes hours. Figures without a table (settings, earlier runs) are listed under
+`without a table`, with their origin.
 
-`figures_of_pages.yaml` says where each is from: of a page and a source the words of the
-page, and in which table (by the heading above it), row and column their numbers stand,
-or in which sentence (no column). Sources are pages and CSV files that commands write
-into docs/ (`make pictures`, the blind proof, the league) or, of runs of hours, the
-table of the page itself. Figures that come from no table (settings, earlier runs) are
-listed under `without a table`, with what made them.
+CI replaces the copies of tables in docs by the files of its own run before it runs these
+tests, so the pages are compared with the run.
 """
 
 import re
@@ -27,113 +26,120 @@ SOURCES = yaml.safe_load(
     Path(__file__).with_name("figures_of_pages.yaml").read_text(encoding="utf-8")
 )
 NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?")
-# A figure of a result: with decimals, an interval, a share, a count of counts. Whole
-# numbers of things are none.
+# Figures of results: numbers with decimals, intervals, shares, and counts out of counts.
+# Whole numbers of things are not figures.
 FIGURE = re.compile(
-    r"(?<![\w.–/-])[−+]?(?:\d+\.\d+(?:[–-]\d+(?:\.\d+)?)?|\d+(?:\.\d+)?[–-]\d+(?:\.\d+)?(?=\)| %)|\d+ (?:%|µm)|\d+ of \d+)"
+    r"(?<![\w.–/-])[−+]?(?:"
+    r"\d+\.\d+(?:[–-]\d+(?:\.\d+)?)?"
+    r"|\d+(?:\.\d+)?[–-]\d+(?:\.\d+)?(?=\)| %)"
+    r"|\d+ (?:%|µm)"
+    r"|\d+ of \d+)"
 )
-# Measured by whoever runs it, levels of confidence, versions, links and code.
-NONE = re.compile(
-    r"[\d.]+ minutes?|(?<!\d )95 %|Python [\d.]+|\[[^\]]*\]\([^)]*\)|`[^`]*`|!\[.*?\]\(.*?\)"
+# Text without figures: durations on the reader's machine, levels of confidence,
+# versions, links and code.
+NO_FIGURES = re.compile(
+    r"[\d.]+ minutes?|(?<!\d )95 %|Python [\d.]+"
+    r"|\[[^\]]*\]\([^)]*\)|`[^`]*`|!\[.*?\]\(.*?\)"
 )
 
 
-def plain(text):
-    """Text with plain signs, and without marks of thousands: "1 000" and "1,000" are
-    one number."""
+def normalize(text):
+    """Replace special signs, and remove marks of thousands: "1 000" equals "1,000"."""
     text = text.replace("\u2212", "-").replace("**", "")
     return re.sub(r"(?<=\d)[ ,\u2009\u202f\u00a0](?=\d{3}(?!\d))", "", text)
 
 
-def numbers(text):
-    return [
-        number.lstrip("-") for number in NUMBER.findall(plain(text).replace("–", " "))
-    ]
+def list_numbers(text):
+    numbers = NUMBER.findall(normalize(text).replace("–", " "))
+    return [number.lstrip("-") for number in numbers]
 
 
-def tables(path):
-    """Tables of a page by the words of the heading above each; of a CSV file the file,
-    under ""."""
+def split_row(line):
+    return [cell.strip() for cell in line.strip().strip("|").split("|")]
+
+
+def read_tables(path):
+    """Read the tables of a page, each with the heading above it, or one CSV file."""
     if path.suffix == ".csv":
         return [("steps", pd.read_csv(path, dtype=str))]
-    found = []
+    tables = []
     heading = ""
     lines = path.read_text(encoding="utf-8").splitlines()
     for number, line in enumerate(lines):
-        heading = line.lstrip("# ") if line.startswith("#") else heading
+        if line.startswith("#"):
+            heading = line.lstrip("# ")
         if re.fullmatch(r"\|[\s:|-]+\|", line):
             rows = []
-            for each in (lines[number - 1], *lines[number + 1 :]):
-                if not each.startswith("|"):
+            for row in lines[number + 1 :]:
+                if not row.startswith("|"):
                     break
-                rows.append(
-                    [cell.strip() for cell in each.strip().strip("|").split("|")]
-                )
-            found.append((heading, pd.DataFrame(rows[1:], columns=rows[0])))
-    return found
+                rows.append(split_row(row))
+            columns = split_row(lines[number - 1])
+            tables.append((heading, pd.DataFrame(rows, columns=columns)))
+    return tables
 
 
-def cell(source, heading, row, column):
-    """The one cell of a source whose row begins with these words and whose column is
-    named so."""
+def begins_with(row, keys):
+    return all(str(cell) == str(key) for key, cell in zip(keys, row, strict=False))
+
+
+def find_cell(source, heading, row, column):
+    """Return the only cell of a source in a column, in a row that begins with keys."""
     keys = row if isinstance(row, list) else [row]
-    found = []
-    for words, frame in tables(ROOT / source):
-        if heading not in words or column not in frame:
+    cells = []
+    for table_heading, table in read_tables(ROOT / source):
+        if heading not in table_heading or column not in table:
             continue
-        here = frame[
-            [
-                all(str(a) == str(b) for a, b in zip(keys, line, strict=False))
-                for line in frame.to_numpy().tolist()
-            ]
+        position = list(table.columns).index(column)
+        rows = table.to_numpy().tolist()
+        cells += [
+            cells_of_row[position]
+            for cells_of_row in rows
+            if begins_with(cells_of_row, keys)
         ]
-        found += (
-            here[column].tolist()
-            if here[column].ndim == 1
-            else here[column].iloc[:, 0].tolist()
-        )
-    assert len(found) == 1, (source, heading, row, column, found)
-    return found[0]
+    assert len(cells) == 1, (source, heading, row, column, cells)
+    return cells[0]
 
 
-def entries():
+def list_entries():
+    entries = []
     for page, sources in SOURCES.items():
         for source, headings in sources.items():
-            if source != "without a table":
-                for heading, lines in headings.items():
-                    for words, row, column in lines:
-                        yield page, source, heading, words, row, column
+            if source == "without a table":
+                continue
+            for heading, lines in headings.items():
+                entries += [(page, source, heading, *line) for line in lines]
+    return entries
 
 
-def stands(number, found):
-    """Whether a number is one of those found, rounded to its own digits."""
+def is_rounded_from(number, values):
+    """Whether a number is one of some values, rounded to the digits of the number."""
     digits = Decimal(1).scaleb(-len(number.partition(".")[2]))
-    return any(
-        Decimal(other).quantize(digits, ROUND_HALF_UP) == Decimal(number)
-        for other in found
-    )
+    rounded = [Decimal(value).quantize(digits, ROUND_HALF_UP) for value in values]
+    return Decimal(number) in rounded
 
 
 @pytest.mark.parametrize(
-    ("page", "source", "heading", "words", "row", "column"), list(entries())
+    ("page", "source", "heading", "words", "row", "column"), list_entries()
 )
 def test_a_figure_is_that_of_its_table(page, source, heading, words, row, column):
-    assert plain(words) in plain((ROOT / page).read_text(encoding="utf-8"))
+    assert normalize(words) in normalize((ROOT / page).read_text(encoding="utf-8"))
     if column is None:
-        assert row in (ROOT / source).read_text(encoding="utf-8") and set(
-            numbers(words)
-        ) <= set(numbers(row))
+        assert row in (ROOT / source).read_text(encoding="utf-8")
+        assert set(list_numbers(words)) <= set(list_numbers(row))
         return
-    found = cell(source, heading, row, column)
+    cell = find_cell(source, heading, row, column)
     if column == "effects":
-        assert stated_effects(words) == named_effects(found)
+        assert stated_effects(words) == named_effects(cell)
         return
-    values = numbers(found)
+    values = list_numbers(cell)
     if source.endswith(".csv") and "_over_" not in column:
         # Errors of a run are in metres, those of a page in millimetres.
-        values = [str(1000 * Decimal(found))]
-    stated = numbers(words)
-    assert [number for number in stated if not stands(number, values)] == [], found
+        values = [str(1000 * Decimal(cell))]
+    wrong = [
+        number for number in list_numbers(words) if not is_rounded_from(number, values)
+    ]
+    assert wrong == [], cell
 
 
 def named_effects(cell):
@@ -160,64 +166,66 @@ def stated_effects(words):
 
 def test_stated_effects_are_compared_by_name_and_joint():
     cell = "link_weight (joint 2, 3) + payload"
-    words = "gravity sag of joints 2 to 3 and weight of an undeclared payload"
-    assert stated_effects(words) == named_effects(cell)
+    sentence = "gravity sag of joints 2 to 3 and weight of an undeclared payload"
+    assert stated_effects(sentence) == named_effects(cell)
     assert stated_effects("gravity sag of joint 2") != named_effects(cell)
 
 
-def prose(page):
-    """A page without code and what is no figure; of all but the README without tables,
-    which are sources or of long runs."""
+def read_prose(page):
+    """Read a page without code and without text that has no figures.
+
+    Tables are left out, except in the README, because they are sources or belong to
+    long runs.
+    """
     text = (ROOT / page).read_text(encoding="utf-8")
     text = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
     text = re.sub(r"(?m)^ {4,}(?!- |\d).*$", "", text)
     if page != "README.md":
         text = re.sub(r"(?m)^\|.*$", "", text)
-    return plain(NONE.sub("", text))
+    return normalize(NO_FIGURES.sub("", text))
 
 
-def uncovered(page):
-    text = prose(page)
-    stated = [words for of_page, *_, words, _, _ in entries() if of_page == page]
-    stated += [
-        words
-        for lines in SOURCES[page].get("without a table", {}).values()
-        for words in lines
-    ]
-    covered = {
-        place
-        for words in stated
-        for found in re.finditer(re.escape(plain(str(words))), text)
-        for place in range(*found.span())
-    }
+def listed_without_table(page):
+    groups = SOURCES[page].get("without a table", {}).values()
+    return [str(text) for group in groups for text in group]
+
+
+def find_figures_without_source(page):
+    text = read_prose(page)
+    listed = [entry[3] for entry in list_entries() if entry[0] == page]
+    covered = set()
+    for listed_text in [*listed, *listed_without_table(page)]:
+        for match in re.finditer(re.escape(normalize(str(listed_text))), text):
+            covered.update(range(*match.span()))
     return [
-        found[0]
-        for found in FIGURE.finditer(text)
-        if not covered.issuperset(range(*found.span()))
+        match[0]
+        for match in FIGURE.finditer(text)
+        if not covered.issuperset(range(*match.span()))
     ]
 
 
 @pytest.mark.parametrize("page", SOURCES)
 def test_no_figure_is_without_a_source(page):
-    assert uncovered(page) == []
+    assert find_figures_without_source(page) == []
 
 
 @pytest.mark.parametrize("page", SOURCES)
-def test_what_is_listed_without_a_table_stands_on_the_page(page):
-    text = plain((ROOT / page).read_text(encoding="utf-8"))
-    listed = [
-        str(words)
-        for lines in SOURCES[page].get("without a table", {}).values()
-        for words in lines
+def test_words_that_are_listed_without_a_table_are_on_the_page(page):
+    text = normalize((ROOT / page).read_text(encoding="utf-8"))
+    absent = [
+        listed_text
+        for listed_text in listed_without_table(page)
+        if normalize(listed_text) not in text
     ]
-    assert [words for words in listed if plain(words) not in text] == []
+    assert absent == []
 
 
-def test_every_page_is_looked_at():
-    """But for the pages of tables, which commands write."""
+def test_every_page_is_checked():
+    """Pages of tables are left out, because commands write them."""
     pages = {
         f"docs/{page.name}"
         for page in (ROOT / "docs").glob("*.md")
         if not page.name.endswith("_tables.md")
     }
-    assert set(SOURCES) == pages | {"README.md"} and len(list(entries())) > 100
+    assert set(SOURCES) == pages | {"README.md"}
+    assert len(list_entries()) > 100

@@ -1,7 +1,7 @@
-"""Tables of the proofs from documents that never change: what they were when a second
-implementation agreed in every cell.
+"""Tables of the proofs from fixed documents stay as they are.
 
-Where a table is meant to change, write it anew: `GOLDEN=write python -m pytest
+They were written when a second implementation agreed in every cell. If a table is meant
+to change, write it again: `GOLDEN=write python -m pytest
 tests/project/test_golden_tables.py`.
 """
 
@@ -31,28 +31,28 @@ from elastocal_proof.blind.summary import (
     tabulate_rates,
     tabulate_reliability,
 )
-from elastocal_proof.league.methods import dealt
-from elastocal_proof.league.table import league_table, mechanism_table
+from elastocal_proof.league.methods import deal_folds
+from elastocal_proof.league.table import compare_methods, summarize_mechanisms
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 NAMES = sorted(
     path.stem
-    for of in ("blind", "closed_loop", "league")
-    for path in GOLDEN.glob(f"{of}_*.csv")
+    for group in ("blind", "closed_loop", "league")
+    for path in GOLDEN.glob(f"{group}_*.csv")
 )
 SEED = 1
 
 
 def made_tables():
-    """Each by the name of its golden file."""
-    # Those of robots that were tuned on stand in no run beside others.
+    """Make all tables, by the names of their golden files."""
+    # No run has robots that were used for tuning beside others.
     entries = [entry for entry in _cases() if entry[0]["case"]["robots"] == "proof"]
     cases = frame(*entries)
     spans = pd.DataFrame(
         [
             row
-            for document, said, _ in entries
-            for row in list_intervals(PLAN, document, said)
+            for document, stated, _ in entries
+            for row in list_intervals(PLAN, document, stated)
         ]
     )
     moves = _moves()
@@ -81,65 +81,78 @@ def made_tables():
 
 
 def _cases():
-    """Ground truths with verdicts and oracles: right, in a class, wrong, silent, of
-    every group that is scored."""
+    """Yield ground truths with verdicts and oracles of every group that is scored.
+
+    The verdicts are right, a class, wrong, or name nothing.
+    """
     draws = np.random.default_rng(3)
     groups = [("single", 200.0), ("single", 50.0), ("setting", 50.0)]
     groups += [("several_joints", 200.0), ("outside", 200.0), ("none", 0.0)]
     for number in range(90):
         group, level = groups[number % len(groups)]
-        joint = 1 + number % 6
-        right = draws.random() < 0.7
-        kind = "outside:slipping_zero" if group == "outside" else "joint_offset"
-        places = [] if group == "none" or number % 18 == 2 else [(kind, joint)]
-        where = {
-            "robot": "kuka" if number % 5 == 0 else "irb7600",
-            "setting": "force_3kN" if group == "setting" else "usual",
-        }
-        document = truth(
-            *places, group=group, level=level, campaign=f"case_{number:03}", **where
-        )
-        for defect in document["defects"]:
-            defect["parameters"] = {"offset": 1e-4}
-        size = 1e-4 * (1 + 0.3 * draws.standard_normal())
-        name = "joint_offset" if right else "payload"
-        found = effect(
-            name, joint, parameters=[("offset", size, 3e-5)], alternatives=["payload"]
-        )
-        word = (
-            "adequate" if not places and right else ("named", "class")[number % 7 == 0]
-        )
-        effects = [] if word == "adequate" else [found]
-        after = 1e-4 * (1 + 0.1 * draws.random())
-        said = verdict(
-            word,
-            *effects,
-            after=after,
-            freedom=288,
-            compliance=1 + 0.1 * draws.random(),
-        )
-        top = [each["name"] for each in effects]
-        stated = 0.5 + 0.49 * draws.random()
-        sets = [
-            {"mechanisms": top, "probability": stated},
-            {"mechanisms": ["other"], "probability": 1 - stated},
-        ]
-        said["probabilities"] = {"nothing": 0.01, "alarm_p_value": 0.002, "sets": sets}
-        yield (
-            document,
-            said | {"campaign": document["campaign"]},
-            oracle(rms=1e-4 * (1 + 0.02 * draws.random())),
-        )
+        is_right = draws.random() < 0.7
+        document = _ground_truth(number, group, level)
+        stated = _verdict(number, document, draws, is_right=is_right)
+        stated |= {"campaign": document["campaign"]}
+        yield document, stated, oracle(rms=1e-4 * (1 + 0.02 * draws.random()))
+
+
+def _ground_truth(number, group, level):
+    joint = 1 + number % 6
+    kind = "outside:slipping_zero" if group == "outside" else "joint_offset"
+    has_defect = group != "none" and number % 18 != 2
+    document = truth(
+        *([(kind, joint)] if has_defect else []),
+        group=group,
+        level=level,
+        campaign=f"case_{number:03}",
+        robot="kuka" if number % 5 == 0 else "irb7600",
+        setting="force_3kN" if group == "setting" else "usual",
+    )
+    for defect in document["defects"]:
+        defect["parameters"] = {"offset": 1e-4}
+    return document
+
+
+def _verdict(number, document, draws, *, is_right):
+    size = 1e-4 * (1 + 0.3 * draws.standard_normal())
+    named = effect(
+        "joint_offset" if is_right else "payload",
+        1 + number % 6,
+        parameters=[("offset", size, 3e-5)],
+        alternatives=["payload"],
+    )
+    is_adequate = is_right and not document["defects"]
+    kind = "class" if number % 7 == 0 else "named"
+    effects = [] if is_adequate else [named]
+    after = 1e-4 * (1 + 0.1 * draws.random())
+    stated = verdict(
+        "adequate" if is_adequate else kind,
+        *effects,
+        after=after,
+        freedom=288,
+        compliance=1 + 0.1 * draws.random(),
+    )
+    probability = 0.5 + 0.49 * draws.random()
+    mechanisms = [entry["name"] for entry in effects]
+    sets = [
+        {"mechanisms": mechanisms, "probability": probability},
+        {"mechanisms": ["other"], "probability": 1 - probability},
+    ]
+    stated["probabilities"] = {"nothing": 0.01, "alarm_p_value": 0.002, "sets": sets}
+    return stated
 
 
 def _moves(cases=8, poses=30, seed=2, reached=0.5):
-    """Poses of cases of the closed loop, errors normal and of a size for each model; a
-    share `reached` of each is no noise."""
+    """Draw poses of the closed loop, with normal errors whose size depends on the model.
+
+    A share `reached` of each error is not noise.
+    """
     draws = np.random.default_rng(seed)
     sizes = dict(zip(MODELS, (3e-3, 2e-3, 2e-4, 1.1e-4, 1e-4), strict=True))
     rows = []
-    for case, part, model in product(range(cases), PARTS, MODELS):
-        off = np.linalg.norm(
+    for case, path_type, model in product(range(cases), PARTS, MODELS):
+        error_m = np.linalg.norm(
             sizes[model] / np.sqrt(3) * draws.standard_normal((poses, 3)), axis=1
         )
         row = {
@@ -147,13 +160,13 @@ def _moves(cases=8, poses=30, seed=2, reached=0.5):
             "seed": case,
             "verdict": "named",
             "named": case % 2 == 0,
-            "part": part,
+            "part": path_type,
             "model": model,
         }
         row |= {
             "pose": np.arange(poses),
-            "reached_error_m": reached * off,
-            "measured_error_m": off,
+            "reached_error_m": reached * error_m,
+            "measured_error_m": error_m,
         }
         rows.append(
             pd.DataFrame(row | {"predicted_std_m": sizes[model], "corrected": True})
@@ -167,9 +180,9 @@ def _league():
     measured = SimpleNamespace(
         session=np.zeros(len(pose), np.int32), pose=pose, joint_angles=angles
     )
-    folds = dealt(measured, 4, open_stream(SEED, "one", "league folds", 0))["random"][
-        pose
-    ]
+    folds = deal_folds(measured, 4, open_stream(SEED, "one", "league folds", 0))[
+        "random"
+    ][pose]
     results = {}
     for method, size, std in (
         ("geometry", 2e-4, None),
@@ -179,7 +192,7 @@ def _league():
         results["one", "random", method] = make_entries(
             size, 40, len(method), std
         ).assign(fold=folds)
-    found = pd.DataFrame(
+    mechanisms = pd.DataFrame(
         {
             "fold": [1, 2, 3, 4, 1],
             "mechanism": ["payload"] * 4 + ["other"],
@@ -188,20 +201,22 @@ def _league():
         }
     )
     robots = {"A robot": ["one"]}
-    league = league_table(results, robots, "geometry", SEED)
-    return {"league": league, "mechanisms": mechanism_table({"one": found}, robots, 4)}
+    league = compare_methods(results, robots, "geometry", SEED)
+    return {
+        "league": league,
+        "mechanisms": summarize_mechanisms({"one": mechanisms}, robots, 4),
+    }
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    place = (
-        GOLDEN
-        if os.environ.get("GOLDEN") == "write"
-        else tmp_path_factory.mktemp("golden")
-    )
+    if os.environ.get("GOLDEN") == "write":
+        written = GOLDEN
+    else:
+        written = tmp_path_factory.mktemp("golden")
     for name, table in made_tables().items():
-        write_csv(place / f"{name}.csv", table)
-    return place
+        write_csv(written / f"{name}.csv", table)
+    return written
 
 
 def test_every_table_is_kept(folder):

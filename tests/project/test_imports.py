@@ -1,5 +1,7 @@
-"""What jobs and commands may load before they need it, a third of a job of the study;
-and the tool never loads its proof."""
+"""Jobs and commands load no library before they need it.
+
+Libraries took a third of a job of the study. The tool does not load its proof.
+"""
 
 import re
 import subprocess
@@ -22,7 +24,7 @@ _NEVER = {
 }
 _BY_DOCUMENTS = {"jsonschema", "rich", "typer"}
 _OF_STUDY = _NEVER | _BY_DOCUMENTS | {"pandas", "scipy.spatial", "scipy.linalg", "yaml"}
-# Modules whose functions are steps of rules, and the packages that none of them loads.
+# Modules with steps of rules, and the packages that they must not load.
 SCRIPTS = {
     "study": (
         "elastocal.study.equation_11 elastocal.study.evaluation elastocal.study.simulation",
@@ -51,64 +53,65 @@ for words in {commands}:
 """
 
 
-def loaded(code):
-    """Modules that a fresh process has once it has run some code."""
+def list_loaded_modules(code):
+    """List the modules that are loaded in a new process after it has run some code."""
     code += "\nimport sys\nprint(*sys.modules)"
-    done = subprocess.run(
+    finished = subprocess.run(
         [sys.executable, "-c", code],
         cwd=TOP,
         capture_output=True,
         text=True,
         check=True,
     )
-    return set(done.stdout.split())
+    return set(finished.stdout.split())
 
 
 @pytest.mark.parametrize(("scripts", "never"), SCRIPTS.values(), ids=SCRIPTS)
 def test_a_job_starts_without_what_it_does_not_need(scripts, never):
-    found = loaded(
-        f"import sys\nsys.path.insert(0, 'workflow/scripts')\nimport job, {scripts.replace(' ', ', ')}"
+    modules = ", ".join(["job", *scripts.split()])
+    loaded = list_loaded_modules(
+        f"import sys\nsys.path.insert(0, 'workflow/scripts')\nimport {modules}"
     )
-    assert {"elastocal", "numpy", "pyarrow"} <= found
-    assert not found & never
+    assert {"elastocal", "numpy", "pyarrow"} <= loaded
+    assert not loaded & never
 
 
-def test_help_is_given_without_anything_that_computes():
+def test_help_loads_no_library_that_computes():
     commands = [
         [],
         ["import"],
         *(["import", name] for name in ("urdf", "dh", "csv")),
-        *([c.__name__] for c in COMMANDS),
+        *([command.__name__] for command in COMMANDS),
     ]
-    found = loaded(_HELP.format(commands=commands))
-    assert "elastocal.command.main" in found
-    assert not found & (_OF_STUDY - {"typer"} | {"numpy", "pyarrow", "scipy"})
+    loaded = list_loaded_modules(_HELP.format(commands=commands))
+    assert "elastocal.command.main" in loaded
+    assert not loaded & (_OF_STUDY - {"typer"} | {"numpy", "pyarrow", "scipy"})
 
 
 def test_a_table_is_written_and_read_without_pandas(tmp_path):
-    """PyArrow would import it for the first array, and where it turns one into
-    numpy's."""
-    found = loaded(f"""
+    """PyArrow imports pandas for its first array, and to convert one to numpy."""
+    loaded = list_loaded_modules(f"""
 import numpy as np
 from elastocal.io.storage import Column, TableSchema, read_table, write_table
-kinds = {{"int32": [1, 2], "float64": [0.5, 2.0], "float32": [0.5, 2.0], "bool": [True, False], "string": ["µ", "b"]}}
+kinds = {{"int32": [1, 2], "float64": [0.5, 2.0], "float32": [0.5, 2.0]}}
+kinds |= {{"bool": [True, False], "string": ["µ", "b"]}}
 schema = TableSchema("made", tuple(Column(name, name, "", "made") for name in kinds))
 write_table({str(tmp_path / "made.parquet")!r}, schema, [kinds], {{"robot": "kuka"}})
 read = read_table({str(tmp_path / "made.parquet")!r}, schema)
 assert {{name: values.tolist() for name, values in read.items()}} == kinds
 """)
-    assert "elastocal.io.storage" in found
-    assert not found & _OF_STUDY
+    assert "elastocal.io.storage" in loaded
+    assert not loaded & _OF_STUDY
 
 
-def test_the_tool_imports_the_proof_in_its_demonstration_alone():
-    """For annotations too, which import-linter leaves out."""
+def test_only_the_demonstration_of_the_tool_imports_the_proof():
+    """Annotations count too, which import-linter leaves out."""
     importing = re.compile(r"^ *(?:from|import) elastocal_proof", re.MULTILINE)
-    found = [
+    files = [
         path
         for path in (TOP / "src/elastocal").rglob("*.py")
         if importing.search(path.read_text(encoding="utf-8"))
     ]
-    assert [path.relative_to(TOP).as_posix() for path in found] == [
+    assert [path.relative_to(TOP).as_posix() for path in files] == [
         "src/elastocal/command/demo.py"
     ]

@@ -1,5 +1,7 @@
-"""Commands that pages show: their targets, subcommands and options are there, and
-how-to pages work from top to bottom."""
+"""Commands on pages have existing targets, subcommands and options.
+
+How-to pages work from top to bottom.
+"""
 
 import os
 import re
@@ -19,8 +21,8 @@ ROOT = Path(__file__).resolve().parents[2]
 SHELLS = ("sh", "bash", "console")
 PROGRAMS = ["make", "snakemake", "elastocal", "python", "pip", "uv", "apt-get"]
 PROGRAMS += ["mkdir", "cp", "find", "sed", "git", "pre-commit"]
-# How-to pages are run from top to bottom, each in a folder of its own, up to a command
-# of these: they need a diagnosis, which the scripts have.
+# How-to pages are run from top to bottom, each in its own folder, without these commands:
+# they need a diagnosis.
 AFTER_A_DIAGNOSIS = (
     "elastocal certificate",
     "elastocal correct",
@@ -30,75 +32,67 @@ AFTER_A_DIAGNOSIS = (
 
 
 def pages():
-    found = [
+    files = [
         *ROOT.glob("*.md"),
         *(ROOT / "docs").rglob("*.md"),
         *ROOT.glob("[bcdr]*/README.md"),
     ]
     return sorted(
         page
-        for page in found
+        for page in files
         if page.name not in ("paper.md", "CHANGELOG.md") and "site" not in page.parts
     )
 
 
 def as_typed(line):
-    """A line of a shell without its comment, blanks that align it, and the folder of
-    the environment."""
-    words = re.sub(r"\s+#.*", "", line.strip())
-    return " ".join(words.split()).replace(".venv/bin/", "").replace(r"\|", "|")
+    """Remove comment, alignment and the folder of the environment from a line."""
+    command = re.sub(r"\s+#.*", "", line.strip())
+    return " ".join(command.split()).replace(".venv/bin/", "").replace(r"\|", "|")
 
 
 def begins_a_command(text):
-    words = text.split()
-    while words and re.fullmatch(r"\w+=\S*", words[0]):
-        words.pop(0)
+    arguments = text.split()
+    while arguments and re.fullmatch(r"\w+=\S*", arguments[0]):
+        arguments.pop(0)
     return (
-        bool(words)
-        and (words[0] in PROGRAMS or words[0].startswith("workflow/"))
-        and len(words) > 1
+        bool(arguments)
+        and (arguments[0] in PROGRAMS or arguments[0].startswith("workflow/"))
+        and len(arguments) > 1
     )
 
 
 def shell_lines(text):
-    """Lines of a block as the shell takes them: continued ones joined, here-documents
-    left out."""
+    """Join continued lines of a block, and leave out here-documents."""
     without = re.sub(
         r"<<'(\w+)'\n.*?\n\1$", r"<<'\1'", text, flags=re.DOTALL | re.MULTILINE
     )
     return re.sub(r"\\\n\s*", " ", without).splitlines()
 
 
+def commands_of_block(token):
+    """List the commands of a code block; a block without a language may be output."""
+    language = token.info.strip()
+    if token.type not in ("fence", "code_block") or language not in ("", *SHELLS):
+        return []
+    lines = [as_typed(line) for line in shell_lines(token.content)]
+    return [line for line in lines if language in SHELLS or begins_a_command(line)]
+
+
+def commands_in_sentences(token):
+    """List the commands within sentences that have more than a name."""
+    codes = [child for child in token.children or () if child.type == "code_inline"]
+    lines = [as_typed(code.content) for code in codes]
+    return [line for line in lines if begins_a_command(line) and "=…" not in line]
+
+
 def commands(page):
-    """Commands of a page with their lines: of blocks, and those within sentences that
-    have more than a name."""
-    found = []
+    """List the commands of a page with their lines."""
+    listed = []
     for token in MarkdownIt("commonmark").parse(page.read_text(encoding="utf-8")):
-        lines = []
-        if token.type in ("fence", "code_block") and token.info.strip() in (
-            "",
-            *SHELLS,
-        ):
-            typed = [as_typed(line) for line in shell_lines(token.content)]
-            lines = [
-                line
-                for line in typed
-                if token.info.strip() in SHELLS or begins_a_command(line)
-            ]
-        inline = [
-            as_typed(child.content)
-            for child in token.children or ()
-            if child.type == "code_inline"
-        ]
-        lines += [
-            line for line in inline if begins_a_command(line) and "=…" not in line
-        ]
-        found += [
-            (line, f"{page.relative_to(ROOT)}:{token.map[0] + 1}")
-            for line in lines
-            if line and not line.startswith("#")
-        ]
-    return found
+        for line in commands_of_block(token) + commands_in_sentences(token):
+            if line and not line.startswith("#"):
+                listed.append((line, f"{page.relative_to(ROOT)}:{token.map[0] + 1}"))
+    return listed
 
 
 def every_command():
@@ -106,8 +100,7 @@ def every_command():
 
 
 def story(page):
-    """What a how-to page types, until something needs a diagnosed campaign; None of
-    another page."""
+    """List the blocks of a how-to page that need no diagnosis; None for other pages."""
     if "how_to" not in page.parts:
         return None
     tokens = MarkdownIt("commonmark").parse(page.read_text(encoding="utf-8"))
@@ -122,30 +115,30 @@ def story(page):
 STORIES = {page.stem: story(page) for page in pages() if story(page)}
 
 
-def test_every_subcommand_and_option_of_a_page_is_one_of_the_command():
-    found = [
-        (shlex.split(text)[1:], where)
-        for text, where in every_command()
+def test_the_command_has_every_subcommand_and_option_of_a_page():
+    entries = [
+        (shlex.split(text)[1:], line)
+        for text, line in every_command()
         if text.startswith("elastocal ")
     ]
-    assert len(found) > 20
-    for words, where in found:
+    assert len(entries) > 20
+    for arguments, line in entries:
         command = get_command(app)
-        while words and words[0] in getattr(command, "commands", {}):
-            command = command.commands[words[0]]
-            words = words[1:]
+        while arguments and arguments[0] in getattr(command, "commands", {}):
+            command = command.commands[arguments[0]]
+            arguments = arguments[1:]
         assert (
             not getattr(command, "commands", {})
-            or not words
-            or words[0].startswith("-")
-        ), (where, words)
+            or not arguments
+            or arguments[0].startswith("-")
+        ), (line, arguments)
         options = {
             name
             for option in command.params
             for name in (*option.opts, *option.secondary_opts)
         }
-        asked = {word.partition("=")[0] for word in words if word.startswith("--")}
-        assert asked <= options | {"--help"}, (where, asked - options)
+        given = {word.partition("=")[0] for word in arguments if word.startswith("--")}
+        assert given <= options | {"--help"}, (line, given - options)
 
 
 def test_make_knows_its_targets():
@@ -156,32 +149,35 @@ def test_make_knows_its_targets():
             if re.fullmatch(r"make [\w./-]+", text)
         }
     )
-    ran = subprocess.run(
+    finished = subprocess.run(
         ["make", "-n", *targets], cwd=ROOT, capture_output=True, text=True
     )
-    assert len(targets) > 5 and ran.returncode == 0, ran.stderr
+    assert len(targets) > 5 and finished.returncode == 0, finished.stderr
 
 
 def test_targets_of_snakemake_are_rules():
-    """What a plan of them would say takes minutes."""
+    """A plan of all of them would take minutes."""
     rules = [
         path.read_text(encoding="utf-8")
         for path in (ROOT / "Snakefile", *(ROOT / "workflow" / "rules").glob("*.smk"))
     ]
-    known = {
+    rule_names = {
         rule
         for text in rules
         for rule in re.findall(r"^rule (\w+):", text, re.MULTILINE)
     }
-    asked = (
+    command_words = (
         text.partition(" --")[0].split()[1:]
         for text, _ in every_command()
         if text.startswith("snakemake ")
     )
     targets = {
-        word for words in asked for word in words if re.fullmatch(r"[a-z_]+", word)
+        argument
+        for arguments in command_words
+        for argument in arguments
+        if re.fullmatch(r"[a-z_]+", argument)
     }
-    assert len(targets) > 5 and targets <= known, targets - known
+    assert len(targets) > 5 and targets <= rule_names, targets - rule_names
 
 
 @pytest.mark.slow
@@ -195,11 +191,11 @@ def test_a_how_to_page_works_from_top_to_bottom(page, tmp_path):
         "PATH": f"{binaries}:{os.environ['PATH']}",
         "OMP_NUM_THREADS": "1",
     }
-    ran = subprocess.run(
+    finished = subprocess.run(
         ["bash", "-c", script],
         cwd=tmp_path,
         capture_output=True,
         text=True,
         env=environment,
     )
-    assert ran.returncode == 0, ran.stdout + ran.stderr
+    assert finished.returncode == 0, finished.stdout + finished.stderr

@@ -1,8 +1,6 @@
-"""Files that pages name are there, a function that stands beside a module is in it,
-rooms have the limits of the lint.
+"""Files and functions that pages name exist, and the README is short.
 
-README is understood at once: it is short, and its first screen answers. Its figures:
-test_figures_of_pages.py.
+Its figures are checked by test_figures_of_pages.py.
 """
 
 import re
@@ -28,9 +26,10 @@ PAGES = [
 PATH = re.compile(
     r"`((?:[\w.-]+/)*[\w-]+\.(?:py|smk|yaml|csv|typ|txt|toml|cff|lock|sh)|(?:[\w.-]+/)+)`"
 )
-# What commands make, what a reader has, and places for names of one's own.
-MADE = re.compile(
-    r"^(?:(?:reports|results|profiles|site|data/(?:simulated|campaigns|public))/|campaigns/(?!importers))|^(?:/|\.)|NAME|CAMPAIGN|\.rst$|a/(?:test_)?b\.py$"
+# Files that commands make, files of a reader, and names that stand for others.
+NOT_IN_REPOSITORY = re.compile(
+    r"^(?:(?:reports|results|profiles|site|data/(?:simulated|campaigns|public))/"
+    r"|campaigns/(?!importers))|^(?:/|\.)|NAME|CAMPAIGN|\.rst$|a/(?:test_)?b\.py$"
 )
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PACKAGE = ROOT / "src/elastocal"
@@ -46,61 +45,51 @@ TOPS = [
 ]
 
 
-def paths_of(page):
-    """Those in backticks and those that links lead to."""
+def list_paths(page):
+    """List the paths of a page that are in backticks or that links lead to."""
     text = page.read_text(encoding="utf-8")
-    links = {
-        link for link in re.findall(r"\]\(([^)#\s]+)\)", text) if "://" not in link
-    }
-    return {
-        path
-        for path in links | {*PATH.findall(text)}
-        if (path in links or "/" in path) and not MADE.search(path)
-    }
+    targets = re.findall(r"\]\(([^)#\s]+)\)", text)
+    links = {target for target in targets if "://" not in target}
+    named = {path for path in PATH.findall(text) if "/" in path}
+    return {path for path in links | named if not NOT_IN_REPOSITORY.search(path)}
 
 
-def test_every_path_that_a_page_names_is_there():
-    found = {(page, path) for page in PAGES for path in paths_of(page)}
-    assert {
-        path
-        for page, path in found
-        if not any((folder / path).exists() for folder in (page.parent, *TOPS))
-    } == set()
-    # Lest the search find none.
-    assert len({path for _, path in found}) > 60
+def exists(path, page):
+    return any((folder / path).exists() for folder in (page.parent, *TOPS))
 
 
-def architecture():
-    return (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
+def test_every_path_that_a_page_names_exists():
+    paths = {(page, path) for page in PAGES for path in list_paths(page)}
+    assert {path for page, path in paths if not exists(path, page)} == set()
+    # The search must find paths at all.
+    assert len({path for _, path in paths}) > 60
 
 
-def test_a_function_beside_a_module_is_one_of_it():
-    found = re.findall(
-        r"`([\w/]+\.py)`, functions? (`\w+`(?: and `\w+`)*)", architecture()
+def test_a_function_that_is_named_with_a_module_is_in_that_module():
+    architecture = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
+    entries = re.findall(
+        r"`([\w/]+\.py)`, functions? (`\w+`(?: and `\w+`)*)", architecture
     )
-    assert len(found) >= 3
-    for module, words in found:
+    assert len(entries) >= 3
+    for module, names in entries:
         text = (ROOT / "src/elastocal" / module).read_text(encoding="utf-8")
-        assert [
-            name
-            for name in re.findall(r"\w+", words.replace(" and ", " "))
-            if f"\ndef {name}(" not in text
-        ] == []
+        for name in re.findall(r"`(\w+)`", names):
+            assert f"\ndef {name}(" in text, (module, name)
 
 
-MOST_LINES = 120
-MOST_WORDS = 1000
-FIRST_SCREEN = 25
+MAX_LINES = 120
+MAX_WORDS = 1000
+FIRST_SCREEN_LINES = 25
 
 
-def test_it_is_read_in_minutes():
-    assert len(README.splitlines()) <= MOST_LINES
-    assert len(README.split()) <= MOST_WORDS
+def test_the_readme_is_short():
+    assert len(README.splitlines()) <= MAX_LINES
+    assert len(README.split()) <= MAX_WORDS
 
 
 def test_the_first_screen_has_the_claim_a_picture_the_figures_and_four_commands():
     first = README.partition("\n## ")[0].splitlines()
-    assert len(first) <= FIRST_SCREEN
+    assert len(first) <= FIRST_SCREEN_LINES
     assert sum("![" in line for line in first) == 1
     commands = [line.split("#")[0].strip() for line in first if line.startswith("    ")]
     assert commands == [
@@ -110,16 +99,16 @@ def test_the_first_screen_has_the_claim_a_picture_the_figures_and_four_commands(
         ".venv/bin/elastocal demo",
     ]
     screen = "\n".join(first)
-    for words in (
+    for phrase in (
         "uncorrected | corrected | noise floor",
         "false alarms",
         "named correctly",
         "KUKA",
         "UR5",
     ):
-        assert words in screen
+        assert phrase in screen
 
 
-def test_the_six_steps_are_in_their_order():
+def test_the_six_steps_of_the_readme_are_in_their_order():
     steps = re.findall(r"^\d\. \*\*(\w+)\*\*", README, re.MULTILINE)
     assert steps == ["Plan", "Measure", "Check", "Diagnose", "Correct", "Certificate"]

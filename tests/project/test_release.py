@@ -46,7 +46,7 @@ PROJECT = tomllib.loads(text("pyproject.toml"))["project"]
 
 @pytest.mark.parametrize("schema", CHECKED)
 def test_a_file_is_of_its_schema(schema):
-    words = [
+    tokens = [
         sys.executable,
         "-m",
         "check_jsonschema",
@@ -54,7 +54,7 @@ def test_a_file_is_of_its_schema(schema):
         f"vendor.{schema}",
         *CHECKED[schema],
     ]
-    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
+    done = subprocess.run(tokens, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
@@ -75,8 +75,8 @@ def test_public_ci_makes_the_targets_of_ours_in_their_order():
     public = "\n".join(step.get("run", "") for step in steps)
     ours = text(".ci/run")
     made = [
-        re.findall(r"^(?:step \w+ )?make ([a-z-]+)", each, re.MULTILINE)
-        for each in (public, ours)
+        re.findall(r"^(?:step \w+ )?make ([a-z-]+)", script, re.MULTILINE)
+        for script in (public, ours)
     ]
     assert made == 2 * [["lint", "paper", "study", "pictures", "test"]]
 
@@ -111,7 +111,8 @@ def test_the_recipe_has_the_version_and_the_requirements_of_the_wheel():
     assert run.pop("python") == PROJECT["requires-python"]
     requirements = map(Requirement, PROJECT["dependencies"])
     assert run == {
-        CONDA.get(each.name, each.name): str(each.specifier) for each in requirements
+        CONDA.get(requirement.name, requirement.name): str(requirement.specifier)
+        for requirement in requirements
     }
     (script,) = recipe["build"]["python"]["entry_points"]
     assert script.split(" = ") == ["elastocal", PROJECT["scripts"]["elastocal"]]
@@ -151,8 +152,12 @@ def test_papers_cite_what_their_bibliography_has():
 
 
 def test_every_figure_of_the_paper_is_one_of_a_page():
-    found = re.findall(
+    quotations = re.findall(
         r"<!-- (README\.md|docs/\w+\.md): (.*?) -->", text("paper/paper.md")
     )
-    assert len(found) >= 4
-    assert [(page, words) for page, words in found if words not in text(page)] == []
+    assert len(quotations) >= 4
+    assert [
+        (page, quotation)
+        for page, quotation in quotations
+        if quotation not in text(page)
+    ] == []

@@ -74,9 +74,9 @@ def test_nothing_is_fetched_from_elsewhere(pages):
         r'<(?:link|script|img|iframe)[^>]*(?:href|src)="(?:https?:)?//[^"]*"'
     )
     assert [
-        found
+        address
         for path in pages
-        for found in fetched.findall(path.read_text(encoding="utf-8"))
+        for address in fetched.findall(path.read_text(encoding="utf-8"))
     ] == []
     styles = [
         path
@@ -95,19 +95,20 @@ def test_every_effect_has_a_formula_and_a_picture(pages):
 
 
 # Headings without a level, code that no keyboard reaches (critical to axe), landmarks
-# and columns without a name, figures that lead nowhere, control characters, and figures
-# that were to be filled in.
+# and columns without a name, figures without a link, control characters, and
+# placeholders of figures.
 WRONG = re.compile(
-    r'role="heading"(?! aria-level)|<pre>|<aside class="[\w-]+">|<th class="head"><p></p></th>|<p><img '
+    r'role="heading"(?! aria-level)|<pre>|<aside class="[\w-]+">'
+    r'|<th class="head"><p></p></th>|<p><img '
     r"|[\x00-\x08\x0b-\x1f]|@[A-Z]+@"
 )
 
 
 def test_no_page_has_what_cannot_be_read_or_reached_and_none_is_missing(pages):
     assert [
-        (path.name, found)
+        (path.name, match)
         for path in pages
-        for found in WRONG.findall(path.read_text(encoding="utf-8"))
+        for match in WRONG.findall(path.read_text(encoding="utf-8"))
     ] == []
     written = [
         path.relative_to(ROOT)

@@ -41,12 +41,12 @@ def imported(paths):
     """What is installed for each module that the files import, also within functions;
     several packages may share a module."""
     pattern = re.compile(r"^ *(?:from|import) (\w+)", re.MULTILINE)
-    found = {
+    packages = {
         module
         for path in paths
         for module in pattern.findall(path.read_text(encoding="utf-8"))
     }
-    by_module = (DISTRIBUTIONS.get(module) for module in found)
+    by_module = (DISTRIBUTIONS.get(module) for module in packages)
     return [
         {name.lower().replace("_", "-") for name in packages}
         for packages in by_module
@@ -207,7 +207,7 @@ def test_every_sentence_of_the_security_page_names_a_test_that_is_there():
             SECURITY.split(f"**{paragraph}.** ")[1].split("\n\n")[0].split()
         )
         assert [
-            part
-            for part in re.split(r"(?<=[.)])\s+(?=[A-Z])", body)
-            if "`test_" not in part
+            sentence
+            for sentence in re.split(r"(?<=[.)])\s+(?=[A-Z])", body)
+            if "`test_" not in sentence
         ] == []

@@ -45,38 +45,38 @@ IGNORED = shutil.ignore_patterns("__pycache__", "*.egg-info")
 def wheel(tmp_path_factory):
     """Built of a copy of the sources, as the build leaves folders behind; without a
     network."""
-    place = tmp_path_factory.mktemp("wheel")
+    folder = tmp_path_factory.mktemp("wheel")
     for name in SOURCES:
         source = ROOT / name
         shutil.copytree(
-            source, place / name, ignore=IGNORED
-        ) if source.is_dir() else shutil.copy2(source, place / name)
+            source, folder / name, ignore=IGNORED
+        ) if source.is_dir() else shutil.copy2(source, folder / name)
     pip = [sys.executable, "-m", "pip", "-q", "--disable-pip-version-check"]
     alone = ["--no-deps", "--no-build-isolation", "--no-index"]
     done = subprocess.run(
         [*pip, "wheel", *alone, ".", "-w", "dist"],
-        cwd=place,
+        cwd=folder,
         capture_output=True,
         text=True,
     )
     assert done.returncode == 0, done.stderr
-    (found,) = (place / "dist").iterdir()
-    return found
+    (wheel,) = (folder / "dist").iterdir()
+    return wheel
 
 
 @pytest.fixture(scope="module")
 def installed(wheel, tmp_path_factory):
     """An environment with the wheel; the libraries are those of these tests."""
-    place = tmp_path_factory.mktemp("installed")
-    venv.create(place, symlinks=True)
-    packages = Path(sysconfig.get_path("purelib", "venv", {"base": place}))
+    folder = tmp_path_factory.mktemp("installed")
+    venv.create(folder, symlinks=True)
+    packages = Path(sysconfig.get_path("purelib", "venv", {"base": folder}))
     (packages / "libraries.pth").write_text(sysconfig.get_path("purelib"))
     pip = [
         sys.executable,
         "-m",
         "pip",
         "--python",
-        str(place),
+        str(folder),
         "-q",
         "--disable-pip-version-check",
     ]
@@ -86,7 +86,7 @@ def installed(wheel, tmp_path_factory):
         text=True,
     )
     assert done.returncode == 0, done.stderr
-    return place
+    return folder
 
 
 @pytest.fixture
@@ -103,10 +103,10 @@ def run(installed, tmp_path):
 
 
 def files_of(folder):
-    found = (path for path in (ROOT / folder).rglob("*") if path.is_file())
+    files = (path for path in (ROOT / folder).rglob("*") if path.is_file())
     return {
         path.relative_to(ROOT).as_posix()
-        for path in found
+        for path in files
         if not {"__pycache__"} & set(path.parts)
     }
 
@@ -156,7 +156,7 @@ def test_the_installed_pipeline_reads_a_campaign_in_the_working_directory(
     make_folder(tmp_path / "cell", kuka)
     snakefile = installed / "share" / "elastocal" / "Snakefile"
     for target in (["results/loop/made/campaign.json"], ["diagnose", "-n", "-p"]):
-        words = [
+        tokens = [
             "-m",
             "snakemake",
             *target,
@@ -166,7 +166,7 @@ def test_the_installed_pipeline_reads_a_campaign_in_the_working_directory(
             "--config",
             f"campaign={tmp_path / 'cell'}",
         ]
-        done = run("python", *words)
+        done = run("python", *tokens)
         assert done.returncode == 0, done.stderr[-2000:]
     assert (tmp_path / "results" / "loop" / "made" / "training.parquet").is_file()
     assert "reports/loop/made/report.html" in done.stdout

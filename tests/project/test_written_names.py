@@ -202,22 +202,22 @@ def names_written(checkout, tmp_path_factory):
 
     @cache
     def names_of(command):
-        words, place = COMMANDS[command]
+        arguments, output = COMMANDS[command]
         top = shutil.copytree(
             checkout, tmp_path_factory.mktemp("clean") / "top", symlinks=True
         )
         before = listed(top)
         with pytest.MonkeyPatch.context() as patch:
             patch.chdir(top)
-            assert run(*words) is None
+            assert run(*arguments) is None
         after = listed(top)
         names = [
             name
             for name in after
             if after[name] != before.get(name) and (top / name).is_file()
         ]
-        assert names and all(Path(name).is_relative_to(place) for name in names)
-        return [f"{place}/{WHOLE[command]}"] if command in WHOLE else names
+        assert names and all(Path(name).is_relative_to(output) for name in names)
+        return [f"{output}/{WHOLE[command]}"] if command in WHOLE else names
 
     return names_of
 
@@ -265,7 +265,7 @@ def test_a_command_that_is_killed_leaves_the_old_files_or_none(
     replaces all of the old ones."""
     top = shutil.copytree(checkout, tmp_path / "top", symlinks=True)
     monkeypatch.chdir(top)
-    words = COMMANDS[command][0]
+    arguments = COMMANDS[command][0]
     names = [] if command in WHOLE else names_written(command)
     for name in names:
         (top / name).write_text("old")
@@ -279,12 +279,12 @@ def test_a_command_that_is_killed_leaves_the_old_files_or_none(
             "write_text",
             lambda path, text: (path.write_text(text), os._exit(9)),
         )
-        run(*words)
+        run(*arguments)
         os._exit(0)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 9
     assert all((top / name).read_text() == "old" for name in names)
     assert not (top / "out/cell").exists()
-    assert run(*words) is None
+    assert run(*arguments) is None
     assert all((top / name).read_bytes() != b"old" for name in names)
 
 

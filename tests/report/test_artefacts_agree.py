@@ -11,8 +11,8 @@ import pytest
 from drawn_figures import empty_pictures
 from made_loop_tables import CAMPAIGNS, facts_of, plainly, residual_table
 
-from elastocal.report.loop_page import loop_page, write_loop_page
-from elastocal.report.outcome import outcome
+from elastocal.report.loop_page import build_loop_page, write_loop_page
+from elastocal.report.outcome import describe_outcome
 from elastocal.report.typesetting import compile_document
 from elastocal.verdict import write_verdict
 
@@ -40,7 +40,9 @@ def test_artefacts_of_every_verdict_agree(
     facts = facts_of(verdict)
     write_verdict(folder / "verdict.json", verdict)
     compile_document(folder / "report.pdf", "loop.typ", {"facts": facts}, pictures)
-    write_loop_page(folder / "report.html", *loop_page(facts, residual_table(), kuka))
+    write_loop_page(
+        folder / "report.html", *build_loop_page(facts, residual_table(), kuka)
+    )
     page = (
         (folder / "report.html")
         .read_text(encoding="utf-8")
@@ -67,7 +69,7 @@ def test_artefacts_of_every_verdict_agree(
     ]
     wanted = [] if faulty else [1e3 * getattr(errors, stage).rms_m for stage in stages]
     for name, text in (
-        texts | {"terminal": bare(" ".join(outcome([f"{folder}/report.pdf"])))}
+        texts | {"terminal": bare(" ".join(describe_outcome([f"{folder}/report.pdf"])))}
     ).items():
         found = re.findall(
             rf"{' ?→ ?'.join([r'([0-9.]+)'] * len(stages))} mm(?: ?\(noise ([\d.]+)\))?",

@@ -13,7 +13,10 @@ from made_blind_documents import (
 )
 
 from elastocal_proof.blind.summary import summarize_by_robot, summarize_figures
-from elastocal_proof.report.blind_page import reached_words, targets_page
+from elastocal_proof.report.blind_page import (
+    describe_reached_targets,
+    format_targets_page,
+)
 
 
 def test_each_quantity_stands_beside_its_target_with_each_robot_alone_and_the_limit():
@@ -31,7 +34,7 @@ def test_each_quantity_stands_beside_its_target_with_each_robot_alone_and_the_li
     cases = frame(*entries)
     summary = summarize_figures(PLAN, cases, pd.DataFrame(), 1)
     alone = summarize_by_robot(PLAN, cases, 1)
-    page = targets_page(
+    page = format_targets_page(
         PLAN,
         summary,
         {"The heavy one": alone["irb7600"], "A soft one": alone["gen3"]},
@@ -73,10 +76,10 @@ def test_how_many_are_reached_says_on_which_robots():
     fine = summarize_figures(
         PLAN, frame(*[(truth(), silence(), oracle(1.0))] * 100), pd.DataFrame(), 1
     )
-    assert reached_words(fine).endswith(
+    assert describe_reached_targets(fine).endswith(
         "with a target reach it on the robots of the proof."
     )
     tuned = summarize_figures(
         PLAN, frame((truth(robot="kuka"), silence(), oracle(1.0))), pd.DataFrame(), 1
     )
-    assert "which proves nothing" in reached_words(tuned)
+    assert "which proves nothing" in describe_reached_targets(tuned)

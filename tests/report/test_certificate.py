@@ -6,7 +6,7 @@ import pytest
 from drawn_figures import empty_pictures
 from made_certificates import make_document
 
-from elastocal.report.certificate import certificate_facts, share_name
+from elastocal.report.certificate import collect_certificate_facts, name_budget_entry
 from elastocal.report.typesetting import compile_document
 
 
@@ -33,7 +33,9 @@ from elastocal.report.typesetting import compile_document
     ],
 )
 def test_decisions_come_with_their_criterion_and_risk(decision, changed, words):
-    text = certificate_facts(make_document(decision, **changed))["decision_sentences"]
+    text = collect_certificate_facts(make_document(decision, **changed))[
+        "decision_sentences"
+    ]
     criterion = "the predicted RMS position error of the corrected robot, 95 % sure to be below 0.160 mm, against the tolerance of"
     for word in (
         *words,
@@ -48,22 +50,24 @@ def test_decisions_come_with_their_criterion_and_risk(decision, changed, words):
 def test_a_correction_that_makes_validation_poses_worse_is_advised_against():
     document = make_document()
     document["validation_rms_m"]["corrected"] = 2e-3
-    assert certificate_facts(document)["now"].startswith(
+    assert collect_certificate_facts(document)["now"].startswith(
         "Do not correct the robot by this campaign"
     )
 
 
 @pytest.mark.parametrize("decision", ["pass", "fail", "undecided"])
 def test_every_kind_of_certificate_is_typeset(tmp_path, decision):
-    facts = certificate_facts(make_document(decision, misplaced=decision == "fail"))
+    facts = collect_certificate_facts(
+        make_document(decision, misplaced=decision == "fail")
+    )
     json.dumps(facts, allow_nan=False)
-    small = certificate_facts(
+    small = collect_certificate_facts(
         make_document() | {"budget": [{"name": "payload", "rms_m": 5e-8}]}
     )
     assert small["budget"] == [["weight of an undeclared payload", "below 0.1\u00a0µm"]]
     assert (
         facts["budget"][-1][1] == "hidden by the tracker's noise"
-        and share_name("link_weight") == "gravity sag"
+        and name_budget_entry("link_weight") == "gravity sag"
     )
     path = tmp_path / "certificate.pdf"
     compile_document(

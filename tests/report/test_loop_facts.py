@@ -21,13 +21,13 @@ from made_loop_tables import (
 from elastocal.diagnosis.verdict import NAMED
 from elastocal.report.loop_facts import (
     AT_FAULT,
-    campaign_sentences,
-    cause_rows,
-    compliance_rows,
-    cost_words,
-    effect_facts,
+    describe_effect,
+    format_cost,
+    render_campaign_sentences,
+    tabulate_causes,
+    tabulate_compliances,
 )
-from elastocal.report.loop_facts import step_rows as table_rows
+from elastocal.report.loop_facts import tabulate_steps as table_rows
 from elastocal.verdict import Compliances
 
 WORDS = {
@@ -60,7 +60,7 @@ def test_facts_are_json_and_the_verdict_is_said_in_plain_words(campaign):
 
 def test_what_to_do_follows_from_the_verdict_and_from_the_gain():
     def now(verdict, experiment=()):
-        return campaign_sentences(verdict, experiment=experiment)["now"]
+        return render_campaign_sentences(verdict, experiment=experiment)["now"]
 
     ends = ((0.15, 0.32), (-0.3, -0.1), (-0.1, 0.3))
     gained, lost, unsure = (
@@ -107,7 +107,7 @@ def test_what_to_do_follows_from_the_verdict_and_from_the_gain():
 )
 def test_each_cause_states_its_cost_and_small_ones_are_negligible(changed, words):
     assert (
-        cost_words(replace(effect_entry(), **changed), CAMPAIGNS["named"].heldout)
+        format_cost(replace(effect_entry(), **changed), CAMPAIGNS["named"].heldout)
         == words
     )
 
@@ -118,7 +118,7 @@ def test_causes_are_those_found_and_what_else_is_probable_with_the_probabilities
         ({"joint_tilt": ["joint 2"], "other": [""]}, 0.36),
         ({}, 0.04),
     ]
-    rows = cause_rows(
+    rows = tabulate_causes(
         make_verdict(NAMED, [replace(effect_entry(), probability=0.6)], sets=sets)
     )
     assert [(row["name"], plainly(row["words"]), row["cost"]) for row in rows] == [
@@ -128,7 +128,7 @@ def test_causes_are_those_found_and_what_else_is_probable_with_the_probabilities
         ("Nothing is missing", "4 %", ""),
     ]
     assert (
-        cause_rows(CAMPAIGNS["unexplained"])[0]["name"]
+        tabulate_causes(CAMPAIGNS["unexplained"])[0]["name"]
         == "Something that the catalogue does not have"
     )
 
@@ -159,13 +159,13 @@ def test_a_fault_of_the_data_is_no_effect():
 def test_parameters_stand_in_readable_units_with_what_determines_them_and_of_whom_they_are():
     effect = effect_entry()
     heldout = CAMPAIGNS["named"].heldout
-    assert effect_facts(effect, heldout)["parameters"] == [
+    assert describe_effect(effect, heldout)["parameters"] == [
         ["half play", "120.0 ± 3.0", "µrad", "measurements"]
     ]
     # What the measurements do not identify is counted, and no number of it is printed.
     hidden = replace(effect.parameters[0], identifiable=False)
     effect = replace(effect, parameters=(hidden, *effect.parameters[1:]))
-    facts = effect_facts(effect, heldout)
+    facts = describe_effect(effect, heldout)
     assert (facts["parameters"], facts["held"]) == ([], 1)
     # What belongs to an effect as a whole, such as its largest sag, stands without a
     # member.
@@ -177,9 +177,9 @@ def test_parameters_stand_in_readable_units_with_what_determines_them_and_of_who
     )
     sag = replace(effect.parameters[0], name="link_weight largest_sag", unit="m")
     effect = replace(effect, parameters=(sag, *effect.parameters))
-    names = [row[0] for row in effect_facts(effect, heldout)["parameters"]]
+    names = [row[0] for row in describe_effect(effect, heldout)["parameters"]]
     assert names[0] == "largest sag" and names[1].startswith("joint 2: ")
-    many = effect_facts(CAMPAIGNS["hundreds of parameters"].effects[0], heldout)
+    many = describe_effect(CAMPAIGNS["hundreds of parameters"].effects[0], heldout)
     assert (
         len(many["parameters"]) == 10
         and many["left_out"] == str(len(HARMONICS) * len(WAVES))
@@ -207,13 +207,13 @@ def test_before_and_after_have_intervals_and_multiples():
 
 
 def test_of_a_compliance_that_is_not_identifiable_no_number_is_stated_and_of_a_file_that_fits_none_all_are():
-    rows = compliance_rows(
+    rows = tabulate_compliances(
         Compliances((0.5, 0.4), (0.48, 0.4), (0.01, 0.0), (True, False))
     )
     assert rows == [
         ["1", "0.500", "0.480 ± 0.010"],
         ["2", "not identifiable", "not identifiable"],
     ]
-    assert compliance_rows(Compliances((0.5,), (0.5,), (0.0,), (False,))) == [
+    assert tabulate_compliances(Compliances((0.5,), (0.5,), (0.0,), (False,))) == [
         ["1", "0.5", "0.5"]
     ]

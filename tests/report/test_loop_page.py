@@ -12,9 +12,9 @@ from durations import HUNG_S
 from made_loop_tables import CAMPAIGNS, facts_of, residual_table
 
 from elastocal.io.origin import Origin
-from elastocal.loop.schemas import angles_of
+from elastocal.loop.schemas import stack_joint_angles
 from elastocal.mechanics.kinematics import locate_corners
-from elastocal.report.loop_page import loop_page, write_loop_page
+from elastocal.report.loop_page import build_loop_page, write_loop_page
 
 CHROMIUM = shutil.which("chromium")
 # Colour of what the page and a plot are drawn on.
@@ -33,7 +33,7 @@ ALL_IN_SIGHT = """() => {
 
 def page_of(kuka, name="named", **changed):
     verdict = replace(CAMPAIGNS[name], **changed)
-    return loop_page(facts_of(verdict), residual_table(), kuka)
+    return build_loop_page(facts_of(verdict), residual_table(), kuka)
 
 
 def data_in(path):
@@ -84,10 +84,10 @@ def test_the_robot_is_drawn_at_the_angles_of_the_model_whatever_its_controller_r
         reported_matrix=np.diag([1.0, -1, -1, 1, 1, 1]),
         reported_offset=np.full(6, 0.3),
     )
-    _, data = loop_page(facts_of(verdict), table, other)
+    _, data = build_loop_page(facts_of(verdict), table, other)
     np.testing.assert_allclose(
         data["outlines"][0],
-        locate_corners(kuka.chain, angles_of(table, 6)[:1])[:, 0],
+        locate_corners(kuka.chain, stack_joint_angles(table, 6)[:1])[:, 0],
         atol=1e-4,
     )
 

@@ -2,7 +2,7 @@
 
 from made_loop_tables import CAMPAIGNS
 
-from elastocal.report.outcome import outcome
+from elastocal.report.outcome import describe_outcome
 from elastocal.verdict import write_verdict
 
 
@@ -17,7 +17,7 @@ def test_the_outcome_names_reports_and_verdicts(tmp_path):
     said = {}
     for name in ("not_testable", "named"):
         write_verdict(folder / "verdict.json", CAMPAIGNS[name])
-        said[name] = outcome(made, tmp_path)
+        said[name] = describe_outcome(made, tmp_path)
     first, errors, *rest = said["not_testable"]
     assert first.startswith(
         "! cell7: Whatever a mechanism of the catalogue would contribute"

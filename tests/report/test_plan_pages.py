@@ -10,7 +10,7 @@ from made_surveys import make_candidates, make_survey
 from elastocal.application.planning.plan import choose_plan
 from elastocal.application.planning.sheet import build_sheet
 from elastocal.campaigns.campaign import Target
-from elastocal.report.plan_pages import plan_facts
+from elastocal.report.plan_pages import collect_plan_facts
 from elastocal.report.typesetting import compile_document
 
 
@@ -22,7 +22,7 @@ def made():
 
 def test_a_row_has_the_angles_in_degrees_and_as_many_boxes_as_measurements():
     survey, plan, rows = made()
-    facts = plan_facts(survey, plan, rows, ["worth"])
+    facts = collect_plan_facts(survey, plan, rows, ["worth"])
     angles = np.concatenate([plan.fitted.joint_angles, plan.held_out.joint_angles])
     assert len(facts["rows"]) == len(angles) == 18 and facts["fitted"] == 14
     for row, expected in zip(facts["rows"], angles, strict=True):
@@ -35,13 +35,13 @@ def test_a_row_has_the_angles_in_degrees_and_as_many_boxes_as_measurements():
     known = replace(survey, targets=(Target("T", "tool0", (0.1, 0.0, 0.05)),))
     assert (
         "T on tool0, at (100.00, 0.00, 50.00) mm of it"
-        in plan_facts(known, plan, rows, ["worth"])["targets"][0]
+        in collect_plan_facts(known, plan, rows, ["worth"])["targets"][0]
     )
     assert "an offset that is fitted" in facts["targets"][0]
 
 
 def test_the_sheet_is_typeset(tmp_path):
-    facts = plan_facts(*made(), ["It is worth the effort."])
+    facts = collect_plan_facts(*made(), ["It is worth the effort."])
     pictures = empty_pictures(tmp_path, ["overview", "poses0"])
     compile_document(tmp_path / "plan.pdf", "plan.typ", {"facts": facts}, pictures)
     assert (tmp_path / "plan.pdf").read_bytes().startswith(b"%PDF")

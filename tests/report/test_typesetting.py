@@ -65,7 +65,7 @@ def test_a_document_that_cannot_be_compiled_leaves_the_earlier_pdf_unchanged(
 def test_a_template_has_paragraphs_and_rows_and_keeps_what_may_not_break(
     tmp_path, monkeypatch
 ):
-    made = "# one\n{% for n in (1, 2) %}\nA {{ n | probability_words }}\n  line.\n\n{% endfor %}\n"
+    made = "# one\n{% for n in (1, 2) %}\nA {{ n | format_probability }}\n  line.\n\n{% endfor %}\n"
     made += "## rows\na ¦ {{ b }} ¦\n{# no #}\n\nc ¦ d ¦ e\n"
     (tmp_path / "made.txt").write_text(made, encoding="utf-8")
     monkeypatch.setattr(resources, "files", {"elastocal.report": tmp_path}.__getitem__)

@@ -6,17 +6,17 @@ import pytest
 from elastocal.effects.catalogue import list_bundled_effects
 from elastocal.report.words import (
     UNKNOWN,
-    alternative_words,
-    effect_words,
-    hypotheses_words,
-    in_common,
-    length,
-    listed,
-    location_words,
-    millimetres,
-    plain,
-    probability_words,
-    scaled,
+    find_common_kind,
+    format_alternative,
+    format_hypotheses,
+    format_length,
+    format_located_effect,
+    format_location,
+    format_millimetres,
+    format_number,
+    format_probability,
+    format_with_unit,
+    join_items,
 )
 from elastocal.verdict import MechanismSet
 
@@ -29,7 +29,7 @@ def test_every_effect_of_the_catalogue_brings_its_own_physical_name_and_a_kind()
         for words in named.values()
         if "_" in words or words != words.strip() or words[0].isupper()
     ]
-    assert all(in_common(name, []) for name in list_bundled_effects())
+    assert all(find_common_kind(name, []) for name in list_bundled_effects())
 
 
 @pytest.mark.parametrize(
@@ -72,12 +72,12 @@ def test_every_effect_of_the_catalogue_brings_its_own_physical_name_and_a_kind()
     ],
 )
 def test_locations_are_gathered(effect, locations, expected):
-    assert effect_words(effect, locations).endswith(expected)
+    assert format_located_effect(effect, locations).endswith(expected)
 
 
 def test_a_place_stands_without_the_effect_that_acts_there():
-    assert location_words("joint_offset", "joint 3") == "joint 3"
-    assert location_words("payload", "") == "the whole robot"
+    assert format_location("joint_offset", "joint 3") == "joint 3"
+    assert format_location("payload", "") == "the whole robot"
 
 
 def test_hypotheses_that_hold_the_first_are_stated_by_what_they_add_and_other_is_unknown_or_related():
@@ -89,7 +89,7 @@ def test_hypotheses_that_hold_the_first_are_stated_by_what_they_add_and_other_is
         [],
         ["other"],
     ]
-    assert hypotheses_words(
+    assert format_hypotheses(
         [
             MechanismSet(tuple(names), 0.1, {"link_weight": ("joint 2",)})
             for names in sets
@@ -104,12 +104,12 @@ def test_hypotheses_that_hold_the_first_are_stated_by_what_they_add_and_other_is
     ]
     # Beside "nothing" all are stated in full.
     assert (
-        hypotheses_words(
+        format_hypotheses(
             [MechanismSet(names, 0.5, {}) for names in ((), ("joint_offset",))]
         )[1]
         == "zero offset"
     )
-    assert (alternative_words("other"), alternative_words("payload"))[
+    assert (format_alternative("other"), format_alternative("payload"))[
         0
     ] == "a related mechanism"
 
@@ -129,28 +129,35 @@ def test_hypotheses_that_hold_the_first_are_stated_by_what_they_add_and_other_is
     ],
 )
 def test_values_come_in_units_that_suit_them(value, error, unit, expected):
-    assert scaled(value, error, unit) == expected
+    assert format_with_unit(value, error, unit) == expected
 
 
 def test_no_probability_is_zero_or_one_and_lengths_and_lists_are_those_of_sentences():
     said = [
-        probability_words(value).replace("\u00a0", " ")
+        format_probability(value).replace("\u00a0", " ")
         for value in (0.0, 0.004, 0.02, 0.944, 0.996, 1.0)
     ]
     assert said == ["< 1 %", "< 1 %", "2 %", "94 %", "> 99 %", "> 99 %"]
     stated = [
-        length(value).replace("\u00a0", " ")
+        format_length(value).replace("\u00a0", " ")
         for value in (1.2345e-4, 0.9999e-3, 0.0213, None)
     ]
     assert stated == ["123 µm", "1.00 mm", "21.3 mm", "unknown"]
-    assert [millimetres(value) for value in (1.5e-5, 0.9999e-3, 1.184e-3, 0.0213)] == [
+    assert [
+        format_millimetres(value) for value in (1.5e-5, 0.9999e-3, 1.184e-3, 0.0213)
+    ] == [
         "0.015",
         "1.00",
         "1.18",
         "21.3",
     ]
-    assert plain(0.000123) == "0.000123" and plain(1234.5) == "1234"
-    assert [listed("abc"), listed("a"), listed(""), listed("abcde", 2)] == [
+    assert format_number(0.000123) == "0.000123" and format_number(1234.5) == "1234"
+    assert [
+        join_items("abc"),
+        join_items("a"),
+        join_items(""),
+        join_items("abcde", 2),
+    ] == [
         "a, b and c",
         "a",
         "none",

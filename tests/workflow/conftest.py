@@ -15,8 +15,8 @@ def made_once(factory, name, changes, *arguments):
 
     To be read, not to be changed.
     """
-    own = factory.getbasetemp()
-    study = Study((own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / name)
+    base = factory.getbasetemp()
+    study = Study((base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / name)
     with open(study.folder.with_suffix(".lock"), "w", encoding="utf-8") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         done = study.folder.with_suffix(".done")

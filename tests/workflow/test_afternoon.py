@@ -40,22 +40,26 @@ def test_each_command_and_option_of_the_readme_is_one_of_the_script():
     )
     shown = commands(readme)
     run = commands(script)
-    assert {named(words) for words in shown} == {named(words) for words in run}
+    assert {named(arguments) for arguments in shown} == {
+        named(arguments) for arguments in run
+    }
     # A plan before a diagnosis, a diagnosis before what is made of it.
-    order = [named(words) for words in run]
+    order = [named(arguments) for arguments in run]
     assert (
         order.index("plan")
         < order.index("check")
         < order.index("diagnose")
         < order.index("correct")
     )
-    used = {named(words): set() for words in run}
-    for words in run:
-        used[named(words)] |= {word for word in words if word.startswith("--")}
-    for words in shown:
-        assert {word for word in words if word.startswith("--")} <= used[
-            named(words)
-        ], words
+    used = {named(arguments): set() for arguments in run}
+    for arguments in run:
+        used[named(arguments)] |= {
+            argument for argument in arguments if argument.startswith("--")
+        }
+    for arguments in shown:
+        assert {
+            argument for argument in arguments if argument.startswith("--")
+        } <= used[named(arguments)], arguments
 
 
 # What docs/closed_loop.md holds the corrected robot to, of what noise and repeatability

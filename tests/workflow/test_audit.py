@@ -49,8 +49,8 @@ def folder(small_study, tmp_path_factory):
 
 
 def test_a_finished_study_holds_in_every_check(folder):
-    found = audit_run(audited(folder))
-    assert [finding for finding in found if not finding.holds] == []
+    checks = audit_run(audited(folder))
+    assert [finding for finding in checks if not finding.holds] == []
     by = {
         "numpy's Philox stream",
         "pinocchio",
@@ -58,7 +58,7 @@ def test_a_finished_study_holds_in_every_check(folder):
         "statsmodels on pinocchio",
         "MuJoCo",
     }
-    assert by <= {finding.by for finding in found}
+    assert by <= {finding.by for finding in checks}
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,10 @@ def test_without_pinocchio_an_audit_ends_in_a_line_before_any_job(unstarted):
     )
     command = unstarted.command("-j1", "--quiet", "all", "--", "audit")
     done = subprocess.run(**command, capture_output=True, text=True, timeout=HUNG_S)
-    line = "audit: pinocchio: found no such package; allowed: the extra audit: make audit, or pip install pin"
+    line = (
+        "audit: pinocchio: found no such package;"
+        " allowed: the extra audit: make audit, or pip install pin"
+    )
     assert (done.returncode, done.stderr.strip().splitlines()[-1:]) == (1, [line]), (
         done.stderr
     )

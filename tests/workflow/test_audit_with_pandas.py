@@ -10,10 +10,10 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "audit.md"
 
 
 def code():
-    (found,) = re.findall(
+    (block,) = re.findall(
         r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL
     )
-    return found
+    return block
 
 
 def run(folder, text):

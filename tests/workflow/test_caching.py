@@ -74,12 +74,12 @@ def test_what_changes_no_result_reruns_nothing(finished_paper):
         "-c",
         "commit.gpgsign=false",
     ]
-    for words in (
+    for arguments in (
         ["init", "-q"],
         ["add", "Snakefile", "src", "workflow"],
         ["commit", "-q", "-m", "a"],
     ):
-        subprocess.run([*git, *words], cwd=study.folder, check=True)
+        subprocess.run([*git, *arguments], cwd=study.folder, check=True)
     assert study.planned(PAPER) == set()
 
 
@@ -190,7 +190,7 @@ def test_what_is_added_runs_no_job_of_what_is_there(finished_paper):
 def test_every_script_is_of_a_rule_and_a_rule_watches_the_sources_of_its_own():
     """`complete_rules` gives them to each rule with a script; that of a named step
     watches the function that it calls."""
-    seen = []
+    used_scripts = []
     for file in sorted((REPOSITORY / "workflow" / "rules").glob("*.smk")):
         for body in re.split(
             r"^ *rule\b", file.read_text(encoding="utf-8"), flags=re.MULTILINE
@@ -200,8 +200,8 @@ def test_every_script_is_of_a_rule_and_a_rule_watches_the_sources_of_its_own():
             assert len(scripts) == ("script:" in body) and len(steps) == scripts.count(
                 RUN_STEP
             )
-            seen += scripts
-    assert sorted(set(seen) | {RUN_STEP}) == SCRIPTS
+            used_scripts += scripts
+    assert sorted(set(used_scripts) | {RUN_STEP}) == SCRIPTS
 
 
 # Imports of a script, or of a step, in a process of its own: files of the sources that
@@ -212,16 +212,20 @@ from pathlib import Path
 root, script, step = Path(sys.argv[1]), *sys.argv[2].split(":")
 sys.path.insert(0, str(root / "workflow" / "scripts"))
 body = ast.parse((root / "workflow" / "scripts" / script).read_text()).body
-exec(compile(ast.Module([node for node in body if isinstance(node, (ast.Import, ast.ImportFrom))], []), script, "exec"), {})
+imports = [node for node in body if isinstance(node, (ast.Import, ast.ImportFrom))]
+exec(compile(ast.Module(imports, []), script, "exec"), {})
 exec(f"import {step}" if step else "")
-# What is a catalogue looks up the modules beside it when it is asked.
-for name in [name for name, module in sys.modules.items() if "list_modules" in vars(module)]:
+# A catalogue imports the modules of its package when it is first asked.
+catalogues = [name for name, module in sys.modules.items() if "list_modules" in vars(module)]
+for name in catalogues:
     if name != "elastocal.io.modules":
         package = sys.modules[name.rpartition(".")[0]]
-        for each in sys.modules["elastocal.io.modules"].module_names(package):
-            importlib.import_module(f"{package.__name__}.{each}")
-files = [Path(m.__file__) for m in list(sys.modules.values()) if getattr(m, "__file__", None)]
-print(json.dumps(sorted(f.relative_to(root).as_posix() for f in files if f.is_relative_to(root))))
+        for module_name in sys.modules["elastocal.io.modules"].list_modules(package):
+            importlib.import_module(f"{package.__name__}.{module_name}")
+loaded = [getattr(module, "__file__", None) for module in list(sys.modules.values())]
+files = [Path(file) for file in loaded if file]
+inside = [file.relative_to(root).as_posix() for file in files if file.is_relative_to(root)]
+print(json.dumps(sorted(inside)))
 """
 
 
@@ -235,8 +239,8 @@ print(json.dumps(sorted(f.relative_to(root).as_posix() for f in files if f.is_re
     ids=["some", "all"],
 )
 def test_the_import_closure_is_what_a_script_loads(scripts, unstarted):
-    for each in scripts:
-        script, _, step = each.partition(":")
+    for script_and_step in scripts:
+        script, _, step = script_and_step.partition(":")
         command = [
             sys.executable,
             "-c",
@@ -253,12 +257,12 @@ def test_the_import_closure_is_what_a_script_loads(scripts, unstarted):
             check=True,
             timeout=HUNG_S,
         )
-        found = closure(
+        files = closure(
             unstarted.path("workflow/scripts") / script,
             unstarted.path("src"),
             *([step] if step else []),
         )
-        names = [file.relative_to(unstarted.folder).as_posix() for file in found]
+        names = [file.relative_to(unstarted.folder).as_posix() for file in files]
         # What reads tables into frames is loaded when it is called.
         later = {"src/elastocal/io/data_frames.py"}
         # A table that a module reads beside it counts as the module does.
@@ -267,4 +271,4 @@ def test_the_import_closure_is_what_a_script_loads(scripts, unstarted):
         )
         assert sorted({*json.loads(done.stdout)} | (later & {*names})) == [
             name for name in names if name.endswith(".py")
-        ], each
+        ], script_and_step

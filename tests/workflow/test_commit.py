@@ -50,7 +50,7 @@ def test_a_checkout_is_its_commit_with_a_word_behind_it_where_a_source_is_edited
     )
 
 
-def test_sources_inside_of_another_repository_have_no_commit_nor_have_those_without_one_or_without_git(
+def test_sources_inside_another_repository_or_without_git_have_no_commit(
     checkout, monkeypatch
 ):
     (checkout / "copy").mkdir()

@@ -22,8 +22,8 @@ def test_every_target_finds_its_sources_and_its_jobs_can_be_grouped(
 ):
     """The profile for Slurm lays out groups, which needs no Slurm: no group waits for
     jobs that wait for it."""
-    place = tmp_path / "results of mine"
-    place.mkdir()
+    folder = tmp_path / "results of mine"
+    folder.mkdir()
     where = (
         "--snakefile",
         str(unstarted.path("Snakefile")),
@@ -31,7 +31,7 @@ def test_every_target_finds_its_sources_and_its_jobs_can_be_grouped(
         str(unstarted.path("profiles/slurm")),
     )
     done = started(
-        **unstarted.command("-n", "-p", *where, "--", *TARGETS) | {"cwd": place}
+        **unstarted.command("-n", "-p", *where, "--", *TARGETS) | {"cwd": folder}
     )
     assert done.returncode == 0, done.stderr[-3000:]
     laid_out = set(re.findall(r"^(\w+) +\d+$", done.stdout, re.MULTILINE))

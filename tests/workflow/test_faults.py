@@ -40,7 +40,8 @@ FAULTS = {
         lambda study: study.path("more.yaml").write_text(SECOND_SEED, encoding="utf-8"),
         ("--configfile", "more.yaml"),
         [
-            "more.yaml: line 2: found the key 'seed' again; allowed: each key once (first in line 1)"
+            "more.yaml: line 2: found the key 'seed' again;"
+            " allowed: each key once (first in line 1)"
         ],
     ),
 }
@@ -48,12 +49,12 @@ FAULTS = {
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_nothing_starts_and_one_line_says_why(fault, unstarted):
-    spoil, arguments, found = FAULTS[fault]
+    spoil, arguments, phrases = FAULTS[fault]
     spoil(unstarted)
     ended = unstarted.snakemake("-j1", *arguments)
     assert ended.returncode != 0
     last = ended.stderr.splitlines()[-1]
-    assert all(part in last for part in found)
+    assert all(phrase in last for phrase in phrases)
     assert (
         "Traceback" not in ended.stderr
         and unstarted.files("data/**/*", "results/**/*", "reports/**/*") == []
@@ -87,7 +88,8 @@ def test_spoilt_data_end_the_job_that_reads_them_and_deleted_ones_are_made_again
         .splitlines()
     )
     assert line.startswith(
-        f"{MEASURED}: found other contents than were written; allowed: the file as the pipeline wrote it"
+        f"{MEASURED}: found other contents than were written;"
+        " allowed: the file as the pipeline wrote it"
     )
     assert ended.stderr.splitlines()[-1] == line and "Traceback" not in ended.stderr
     assert finished_paper.files(IDENTIFIED, "results/identified/**/*.partial") == []
@@ -100,14 +102,14 @@ def test_two_runs_of_the_same_files_are_refused_in_one_line(unstarted):
     unstarted.path(".snakemake/locks/0.output.lock").write_text(
         f"{MEASURED}\n", encoding="utf-8"
     )
-    with open(unstarted.path(".snakemake/runs.lock"), "a") as other:
-        fcntl.flock(other, fcntl.LOCK_SH)
+    with open(unstarted.path(".snakemake/runs.lock"), "a") as lock:
+        fcntl.flock(lock, fcntl.LOCK_SH)
         ended = unstarted.snakemake("-j1", MEASURED)
     assert ended.returncode != 0
     last = ended.stderr.splitlines()[-1]
-    assert (
-        last
-        == "snakemake: found another run at work on the same files; allowed: the same command once that one has ended"
+    assert last == (
+        "snakemake: found another run at work on the same files;"
+        " allowed: the same command once that one has ended"
     )
 
 

@@ -114,7 +114,7 @@ def test_each_file_behind_a_report_that_was_changed_is_found_by_every_command(
 ):
     """In one line, before it writes: edited and deleted, and by the commands, in
     turn."""
-    own = cell.files(
+    own_files = cell.files(
         f"{CELL}/**/*",
         "results/**/made/**/*",
         "reports/**/made/**/*",
@@ -123,7 +123,7 @@ def test_each_file_behind_a_report_that_was_changed_is_found_by_every_command(
     # Texts for people are read by no job.
     files = [
         name
-        for name in own
+        for name in own_files
         if cell.path(name).is_file()
         and not name.startswith(("results/logs/", "results/timings/"))
     ]
@@ -237,7 +237,10 @@ def test_a_broken_campaign_ends_with_one_line(unstarted, kuka):
         ended.stderr
     )
     assert (
-        all(word in lines[0] for word in ("line 9", "column y", "nan", "; allowed: "))
+        all(
+            phrase in lines[0]
+            for phrase in ("line 9", "column y", "nan", "; allowed: ")
+        )
         and "Traceback" not in ended.stderr
     )
     log = (
@@ -260,8 +263,11 @@ from elastocal.effects.protocol import Parameter, effect
 
 @effect("gravity", "another sag")
 def sag(own, sites):
-    """One candidate."""
-    yield own.candidate((2,), [Parameter("sag", "rad", 1e-3)], lambda around: [{1: np.cos(5 * around.joint_angles[:, 1])}])
+    """Yield one candidate."""
+    parameters = [Parameter("sag", "rad", 1e-3)]
+    yield own.candidate(
+        (2,), parameters, lambda around: [{1: np.cos(5 * around.joint_angles[:, 1])}]
+    )
 '''
 
 
@@ -270,13 +276,13 @@ def test_a_new_effect_is_a_module_and_a_new_campaign_a_file_that_is_read_again_w
 ):
     """Of the robot that is simulated and of the one that is declared, which are two."""
     cell.path("src/elastocal/effects/sag.py").write_text(SAG, encoding="utf-8")
-    known = yaml.safe_load(
+    document = yaml.safe_load(
         cell.path("config/campaigns/kuka_extended_end_effector.yaml").read_text(
             encoding="utf-8"
         )
     )
     cell.path("config/campaigns/tiny.yaml").write_text(
-        yaml.safe_dump(known | {"poses": 8}), encoding="utf-8"
+        yaml.safe_dump(document | {"poses": 8}), encoding="utf-8"
     )
     cell.configure({"loop": {"campaigns": ["tiny"]}})
     candidates = "reports/loop/made/candidates.csv"

@@ -51,8 +51,8 @@ def test_a_script_that_is_ended_before_it_begins_has_no_log_and_is_said_to_have_
         "import os\n\nos._exit(9)\n",
     )
     ended = finished_paper.snakemake("-j1", "reports/tables/table1.md")
-    found = (
+    message = (
         "typeset_table: found that the job was killed before it wrote its log "
         "(results/logs/typeset_table/table1.log); allowed: "
     )
-    assert ended.returncode != 0 and ended.stderr.splitlines()[-1].startswith(found)
+    assert ended.returncode != 0 and ended.stderr.splitlines()[-1].startswith(message)

@@ -54,11 +54,11 @@ def test_jobs_that_a_killed_run_left_behind_are_waited_for(folder, capfd, monkey
     """The job ends once it is waited for; until then the locks stay."""
     job = holding(folder / JOBS)
     flock = fcntl.flock
-    seen = []
+    states = []
 
     def waited(file, operation):
         if file.name == str(folder / JOBS) and operation == fcntl.LOCK_EX:
-            seen.append(
+            states.append(
                 (
                     len(list((folder / "locks").iterdir())),
                     job.poll(),
@@ -70,7 +70,7 @@ def test_jobs_that_a_killed_run_left_behind_are_waited_for(folder, capfd, monkey
 
     monkeypatch.setattr(fcntl, "flock", waited)
     with begin(folder, []):
-        ((locks, ended, said),) = seen
+        ((locks, ended, said),) = states
         assert (locks, ended) == (1, None) and "waiting for its jobs" in said
         assert list((folder / "locks").iterdir()) == []
         assert job.wait() != 0

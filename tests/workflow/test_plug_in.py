@@ -10,8 +10,8 @@ import pytest
 UR10 = """\
 name: UR10
 chain: >-
-  Tz(0.1273) Rz(q1) Ty(0.1639) Ry(q2) Tx(0.612) [2DoF] Ry(q3) Tx(0.5723) [3DoF] Ry(q4) Rz(q5) Tz(-0.1157) [5DoF]
-  Ry(q6) Ty(0.0922) [6DoF]
+  Tz(0.1273) Rz(q1) Ty(0.1639) Ry(q2) Tx(0.612) [2DoF] Ry(q3) Tx(0.5723) [3DoF]
+  Ry(q4) Rz(q5) Tz(-0.1157) [5DoF] Ry(q6) Ty(0.0922) [6DoF]
 joint_limits_deg: [[-360, 360], [-360, 360], [-180, 180], [-360, 360], [-360, 360], [-360, 360]]
 compliance_urad_per_Nm: [11, 12, 13, 21, 22, 23]
 """

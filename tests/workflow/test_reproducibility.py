@@ -94,8 +94,8 @@ def test_every_figure_and_table_has_a_record_that_names_commit_configuration_and
     assert dict(origin)["seed"] == 1 and len(dict(origin)["configuration_sha256"]) == 64
     figures = [name for name in made if name.endswith(".png")]
     for name in figures:
-        words = Image.open(paper.path(name)).text["Description"]
-        assert all(str(value) in words for value in dict(origin).values()), name
+        description = Image.open(paper.path(name)).text["Description"]
+        assert all(str(value) in description for value in dict(origin).values()), name
 
 
 @pytest.mark.slow

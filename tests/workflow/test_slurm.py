@@ -29,9 +29,11 @@ _ABSENT = [
     for name in ("munged", "slurmctld", "slurmd", "sbatch")
     if not shutil.which(name, path=_PATH)
 ]
-# Each node is a daemon with a port of its own; it has four cores, whatever the machine
-# has.
-_NODE = "NodeName={name} NodeHostname={host} NodeAddr=127.0.0.1 Port={port} CPUs=4 RealMemory={megabytes} State=UNKNOWN\n"
+# Each node is a daemon with its own port. It claims four cores, whatever the machine has.
+_NODE = (
+    "NodeName={name} NodeHostname={host} NodeAddr=127.0.0.1 Port={port} CPUs=4"
+    " RealMemory={megabytes} State=UNKNOWN\n"
+)
 # It needs root, whose jobs other users are, and a machine without a Slurm of its own.
 _CANNOT = (
     os.environ.get("ELASTOCAL_SLURM") != "1"
@@ -72,7 +74,8 @@ rule needs_more:
     output: "made.txt"
     resources: mem_mb=lambda wildcards, attempt: attempt * 500
     params: seconds=lambda wildcards, resources: 60 if resources.mem_mb == 500 else 0
-    shell: "{python} -c 'import time; held = bytearray(450_000_000); time.sleep({{params.seconds}})'"
+    shell: "{python} -c 'import time; held = bytearray(450_000_000);"
+        " time.sleep({{params.seconds}})'"
         " && echo {{resources.mem_mb}} > {{output}}"
 """
 
@@ -92,10 +95,14 @@ def cluster():
                 sockets.enter_context(socket.create_server(("127.0.0.1", 0)))
                 for _ in range(1 + len(NODES))
             ]
-            own, *ports = [each.getsockname()[1] for each in bound]
+            control_port, *ports = [
+                bound_socket.getsockname()[1] for bound_socket in bound
+            ]
         machine = {"host": socket.gethostname().partition(".")[0]}
         text = Path(__file__).with_name("slurm.conf").read_text(encoding="utf-8")
-        text = text.format(port=own, folder=folder, ended="ended.txt", **machine)
+        text = text.format(
+            port=control_port, folder=folder, ended="ended.txt", **machine
+        )
         machine["megabytes"] = (
             os.sysconf("SC_PAGE_SIZE")
             * os.sysconf("SC_PHYS_PAGES")
@@ -196,24 +203,24 @@ def contents(study):
 def test_a_study_on_two_nodes_is_byte_for_byte_that_of_one_machine_and_in_few_jobs(
     cluster, tmp_path
 ):
-    here, there = (Study.of_sources(tmp_path / name) for name in ("here", "there"))
-    for study in (here, there):
+    first, second = (Study.of_sources(tmp_path / name) for name in ("here", "there"))
+    for study in (first, second):
         study.configure(
             {"robots": ["kuka"], "strategies": ["6DoF"], "noise_um": [0, 200]}
         )
-    here.run(*TARGETS)
+    first.run(*TARGETS)
     environment = cluster | {
-        "PYTHONPATH": str(there.folder / "src"),
+        "PYTHONPATH": str(second.folder / "src"),
         "OMP_NUM_THREADS": "1",
     }
     said = on_slurm(
-        there.folder, environment, *TARGETS, "--group-components", "robot=10", "cell=1"
+        second.folder, environment, *TARGETS, "--group-components", "robot=10", "cell=1"
     )
-    made = contents(here)
+    made = contents(first)
     assert made.keys() > set(TARGETS) and len(made) > 4
-    assert contents(there) == made
+    assert contents(second) == made
     submitted = said.count("has been submitted with SLURM jobid")
-    jobs = len(there.files("results/logs/**/*.log"))
+    jobs = len(second.files("results/logs/**/*.log"))
     assert len(NODES) <= submitted <= jobs / 2
     ended = (
         Path(cluster["SLURM_CONF"]).with_name("ended.txt").read_text(encoding="utf-8")

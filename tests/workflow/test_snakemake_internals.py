@@ -106,7 +106,7 @@ def test_a_checksum_is_computed_once_while_the_file_stays_as_it_is(
 ):
     computed = []
 
-    async def checksum(file, threshold, force=False):
+    async def checksum(file, threshold, *, force=False):
         computed.append(str(file))
         return file.read_text()
 

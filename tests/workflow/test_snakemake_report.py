@@ -16,7 +16,7 @@ RULES = [
 
 
 def shown():
-    return [found for text in RULES for found in SHOWN.findall(text)]
+    return [caption for text in RULES for caption in SHOWN.findall(text)]
 
 
 def test_every_caption_is_there_and_every_page_is_a_caption():

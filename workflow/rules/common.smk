@@ -16,9 +16,9 @@ from elastocal.campaigns.importers import (
     list_league_data,
 )
 from elastocal.errors import InputError
-from elastocal.io.origin import SOURCES_DIGEST, Origin, configuration_sha256, environment
+from elastocal.io.origin import SOURCES_DIGEST, Origin, digest_configuration, list_versions
 from elastocal.io.records import compute_sha256
-from elastocal.report.outcome import outcome
+from elastocal.report.outcome import describe_outcome
 from elastocal.study.configuration import check_study, count_components, override_entries
 
 from commit import commit_of
@@ -116,7 +116,7 @@ ORIGIN = Origin(
             "requirements/run.lock",
         ],
     ),
-    configuration_sha256(RESOLVED),
+    digest_configuration(RESOLVED),
     config["seed"],
 )
 config["origin"] = vars(ORIGIN)
@@ -217,7 +217,7 @@ def watch_sources():
 
     A change of the installed libraries or of the list of pins reruns every job that has a script.
     """
-    environment_sha256 = configuration_sha256(environment(ROOT))
+    environment_sha256 = digest_configuration(list_versions(ROOT))
     for definition in workflow.rules:
         if "sources" not in definition.input.keys():
             continue

@@ -6,11 +6,11 @@ import pandas as pd
 
 from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table
-from elastocal.loop.diagnosis_tables import final_parameters
+from elastocal.loop.diagnosis_tables import select_final_parameters
 from elastocal.loop.schemas import STEPS, read_residuals
 from elastocal.mechanics.robot_file import parse_robot
-from elastocal.report.loop_facts import loop_facts
-from elastocal.report.loop_page import loop_page, write_loop_page
+from elastocal.report.loop_facts import collect_loop_facts
+from elastocal.report.loop_page import build_loop_page, write_loop_page
 from elastocal.report.typesetting import compile_document
 from elastocal.verdict import read_verdict
 
@@ -24,10 +24,10 @@ def compile_loop_report(job: Job) -> None:
         for path in (job.input.before_after, job.input.experiment)
     ]
     table = read_residuals(job.input.residuals, robot.joints)
-    parameters = final_parameters(
+    parameters = select_final_parameters(
         read_json(job.input.diagnosis), read_table(job.input.steps, STEPS)
     )
-    facts = loop_facts(verdict, *rows, table, descriptions, parameters)
+    facts = collect_loop_facts(verdict, *rows, table, descriptions, parameters)
     compile_document(
         job.output.report,
         "loop.typ",
@@ -35,7 +35,9 @@ def compile_loop_report(job: Job) -> None:
         job.input.figures,
         origin_of(job),
     )
-    write_loop_page(job.output.page, *loop_page(facts, table, robot), origin_of(job))
+    write_loop_page(
+        job.output.page, *build_loop_page(facts, table, robot), origin_of(job)
+    )
 
 
 run(compile_loop_report, snakemake)

@@ -11,7 +11,11 @@ from elastocal.figures.loop import (
 )
 from elastocal.figures.style import save
 from elastocal.io.json_files import read_json
-from elastocal.loop.schemas import angles_of, read_residuals, worst_measurement
+from elastocal.loop.schemas import (
+    find_worst_measurement,
+    read_residuals,
+    stack_joint_angles,
+)
 from elastocal.mechanics.kinematics import locate_corners
 from elastocal.mechanics.robot_file import parse_robot
 from elastocal.verdict import read_verdict
@@ -21,7 +25,8 @@ def draw_campaign(job: Job) -> None:
     robot = parse_robot(read_json(job.input.descriptions)["robot"])
     table = read_residuals(job.input.residuals, robot.joints)
     arm = locate_corners(
-        robot.chain, angles_of(table, robot.joints)[worst_measurement(table)]
+        robot.chain,
+        stack_joint_angles(table, robot.joints)[find_worst_measurement(table)],
     )
     candidates = pd.read_csv(job.input.candidates).fillna({"note": ""})
     verdict = read_verdict(job.input.verdict)

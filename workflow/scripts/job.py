@@ -12,7 +12,7 @@ from typing import Any, Protocol
 from import_log import write_log
 
 from elastocal.errors import InputError, describe_system_fault
-from elastocal.io.origin import Origin, environment
+from elastocal.io.origin import Origin, list_versions
 from elastocal.io.records import JobRecord, digest_inputs, write_records
 
 # Folder of the Snakefile. Snakemake runs a copy of a script under the name of the file.
@@ -107,7 +107,7 @@ def _build_record(
         unrecorded,
         tuple(map(str, job.output)),
         origin_of(job),
-        environment(TOP),
+        list_versions(TOP),
     )
 
 

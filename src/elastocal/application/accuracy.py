@@ -344,8 +344,8 @@ def compute_length_quantiles(covariance: np.ndarray) -> np.ndarray:
 
     References
     ----------
-    [1] Satterthwaite, F. E., An approximate distribution of estimates of variance
-    components, Biometrics Bulletin 2, 1946.
+    .. [1] Satterthwaite, F. E., An approximate distribution of estimates of variance
+       components, Biometrics Bulletin 2, 1946.
     """
     mean = np.trace(covariance, axis1=1, axis2=2)
     variance = 2.0 * (covariance**2).sum(axis=(1, 2))

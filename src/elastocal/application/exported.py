@@ -16,7 +16,7 @@ import numpy as np
 from elastocal.application.calibrated import predict_poses, remove_effects
 from elastocal.effects.conditions import MASS_PARAMETERS
 from elastocal.exchange.urdf import read_urdf
-from elastocal.exchange.urdf_writing import nominal_chain
+from elastocal.exchange.urdf_writing import find_nominal_chain
 from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
 from elastocal.mechanics.kinematics import compute_poses
 
@@ -156,7 +156,7 @@ def compute_urdf_deviation_m(
     -------
     Distance, m.
     """
-    _, chain = nominal_chain(read_urdf(path), urdf.base, urdf.tip, path.as_posix())
+    chain = find_nominal_chain(read_urdf(path), urdf.base, urdf.tip, path.as_posix())
     urdf_position, _ = compute_poses(
         chain, nominal.model_angles(reported_angles), chain.end_effector
     )

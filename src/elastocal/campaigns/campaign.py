@@ -138,12 +138,12 @@ class Campaign:
     table: str = ""
     header_line: int | None = None
 
-    def place_of(self, row: int) -> str:
+    def locate_row(self, row: int) -> str:
         """Return where a row of the measurements is, by its line if the file is text."""
-        place = f"row {row}"
+        location = f"row {row}"
         if self.header_line is not None:
-            place = f"line {row + self.header_line}"
-        return f"{place} of {self.table}" if self.table else place
+            location = f"line {row + self.header_line}"
+        return f"{location} of {self.table}" if self.table else location
 
 
 def assemble_campaign(

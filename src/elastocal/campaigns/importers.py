@@ -27,7 +27,7 @@ from elastocal.campaigns.writing import write_campaign
 from elastocal.errors import InputError
 from elastocal.io.documents import (
     check_document,
-    document_path,
+    locate_document,
     read_document,
     read_named_document,
 )
@@ -165,12 +165,12 @@ class PublicMeasurements(NamedTuple):
     ----------
     angles : (N, n) joint angles as the controller reports them, rad.
     positions : (N, 3) by target, m.
-    others : further columns (N,) of the file of measurements.
+    further : further columns (N,) of the file of measurements.
     """
 
     angles: np.ndarray
     positions: Mapping[str, np.ndarray]
-    others: Mapping[str, np.ndarray]
+    further: Mapping[str, np.ndarray]
 
 
 def _read_text(entry: Mapping[str, Any], path: str | Path) -> PublicMeasurements:
@@ -293,26 +293,22 @@ class Importer:
         [1] Geisser, S., The predictive sample reuse method with applications, Journal
             of the American Statistical Association 70, 1975.
         """
-        measured = [
-            part.read(path)
-            for part, path in zip(self.parts or (self,), paths, strict=True)
-        ]
-        joints = measured[-1].angles.shape[1]
-        if self.parts:
-            tables = [
-                part._tabulate_session(session, measurements, robots_folder)
-                for session, (part, measurements) in enumerate(
-                    zip(self.parts, measured, strict=True)
+        importers = self.parts or (self,)
+        tables = []
+        targets: list[str] = []
+        for session, (importer, path) in enumerate(zip(importers, paths, strict=True)):
+            measured = importer.read(path)
+            joints = measured.angles.shape[1]
+            targets += measured.positions
+            if self.parts:
+                tables.append(
+                    importer._tabulate_session(session, measured, robots_folder)
                 )
-            ]
-        else:
-            tables = [_tabulate(measured[0], self.same_pose_rad)]
+            else:
+                tables.append(_tabulate(measured, self.same_pose_rad))
         table = {}
         for column in tables[0]:
-            table[column] = np.concatenate([session[column] for session in tables])
-        targets = [
-            target for measurements in measured for target in measurements.positions
-        ]
+            table[column] = np.concatenate([columns[column] for columns in tables])
         has_first_robot = joints <= _JOINTS_OF_FIRST_ROBOT
         document: dict[str, Any] = {
             "campaign": name,
@@ -369,7 +365,7 @@ def _tabulate(
         "target": np.tile(targets, len(pose)),
         **_joint_table(measured.angles[rows]),
         **dict(zip("xyz", position.T, strict=True)),
-        **measured.others,
+        **measured.further,
     }
 
 
@@ -400,10 +396,10 @@ def read_importers(path: Path) -> dict[str, Importer]:
             for file_name, file in entry.get("files", {}).items()
         }
         robots = [*entry["robots"]]
-        parts = tuple(importers[part] for part in entry.get("parts", ()))
-        for part in parts:
-            files |= part.files
-            robots += part.robots
+        parts = tuple(importers[session] for session in entry.get("parts", ()))
+        for session_importer in parts:
+            files |= session_importer.files
+            robots += session_importer.robots
         options = {
             key: entry[key] for key in ("noise", "same_pose_rad") if key in entry
         }
@@ -461,7 +457,7 @@ def read_campaign_sources(
         document = read_named_document(
             folder, "campaigns", "campaign_source", name, source
         )
-        path = document_path(folder, "campaigns", name)
+        path = locate_document(folder, "campaigns", name)
         if document["source"] == "public":
             find_importer(document["importer"], folder, path)
         else:

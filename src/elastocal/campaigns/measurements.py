@@ -246,7 +246,7 @@ def check_column_names(names: Collection[str], joints: int, path: str) -> None:
     joints : number of joints of the robot.
     path : file, for messages.
     """
-    known = describe_columns(joints)
+    columns = describe_columns(joints)
     displayed = {
         f"q{joint}_{unit}" for joint in range(1, joints + 1) for unit in DISPLAY_UNITS
     }
@@ -257,8 +257,8 @@ def check_column_names(names: Collection[str], joints: int, path: str) -> None:
             raise InputError(path, "header", finding, "each column once")
         earlier.add(name)
     for name in names:
-        if name not in known and name not in displayed and name != TICK_COLUMN:
-            missing = [column for column in known if column not in names]
+        if name not in columns and name not in displayed and name != TICK_COLUMN:
+            missing = [column for column in columns if column not in names]
             allowed = suggest_names(name, missing)
             if name.rstrip("0123456789") in ("q", "approach"):
                 # An unknown q7 is puzzling unless the message has the number of joints.

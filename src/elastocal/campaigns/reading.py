@@ -299,7 +299,7 @@ def _refuse_duplicates(
     ]
     target = targets[keys[row, -1]].name
     finding = f"{', '.join(numbers)}, target {target} again"
-    allowed = f"each once (first in {table.place(first[group[row]])})"
+    allowed = f"each once (first in {table.locate(first[group[row]])})"
     raise table.fault(row, "", allowed, finding)
 
 
@@ -325,7 +325,7 @@ def _refuse_poses_of_different_angles(
     apart = np.abs(reported - reported[first[pose]]) > SAME_POSE_RAD
     if apart.any():
         row = np.argwhere(apart)[0, 0]
-        earlier = table.place(first[pose[row]])
+        earlier = table.locate(first[pose[row]])
         allowed = f"within {SAME_POSE_RAD} rad of {earlier}, which is of the same pose"
         table.refuse(apart, names, allowed)
 

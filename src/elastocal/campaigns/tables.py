@@ -133,7 +133,7 @@ class Cells:
     scales: Mapping[str, float] = field(default_factory=dict)
 
     def fault(
-        self, index: int, name: str, allowed: str, found: str | None = None
+        self, index: int, name: str, allowed: str, finding: str | None = None
     ) -> InputError:
         """Return the InputError of one cell.
 
@@ -142,21 +142,21 @@ class Cells:
         index : row, from 0.
         name : column; empty if the whole row is at fault.
         allowed : what the cell may hold.
-        found : what is at fault, if not the contents of the cell.
+        finding : what is at fault, if not the contents of the cell.
         """
-        key = self.place(index)
+        key = self.locate(index)
         if name:
             key += f", column {self.headers.get(name, name)}"
-        if found is None:
-            found = _quote_cell(self.columns[name][index].as_py())
-        return InputError(self.path, key, found, allowed)
+        if finding is None:
+            finding = _quote_cell(self.columns[name][index].as_py())
+        return InputError(self.path, key, finding, allowed)
 
     def refuse(
         self,
         wrong: np.ndarray,
         names: Sequence[str],
         allowed: str,
-        found: str | None = None,
+        finding: str | None = None,
     ) -> None:
         """Raise the InputError of the first wrong cell, if any.
 
@@ -164,13 +164,13 @@ class Cells:
         ----------
         wrong : (N, len(names)) bool array, or (N,) of one column.
         names : columns.
-        allowed, found : as in `fault`.
+        allowed, finding : as in `fault`.
         """
         if wrong.any():
             index, column = np.argwhere(wrong.reshape(len(wrong), -1))[0]
-            raise self.fault(int(index), names[column], allowed, found)
+            raise self.fault(int(index), names[column], allowed, finding)
 
-    def place(self, index: int) -> str:
+    def locate(self, index: int) -> str:
         """Return where a row, counted from 0, is in the file."""
         row = int(self.rows[index])
         if self.header_line is None:
@@ -288,7 +288,7 @@ class _Header:
     names: list[str]
 
     @property
-    def place(self) -> str:
+    def origin(self) -> str:
         """Where the names of the columns come from, for messages."""
         return f"line {self.line}" if self.line else "--columns"
 
@@ -523,7 +523,7 @@ def _read_rows(data_lines: _NumberedLines, header: _Header, source: str) -> _Row
             cells.pop()
         if len(cells) != length:
             finding = format_count(len(cells), "cell")
-            allowed = f"{length}, one for each column of {header.place}"
+            allowed = f"{length}, one for each column of {header.origin}"
             raise InputError(source, f"line {number}", finding, allowed)
         rows.append((number, cells))
     return rows
@@ -539,7 +539,7 @@ def _collect_columns(
     if unknown is not None:
         raise InputError(
             source,
-            header.place,
+            header.origin,
             f"no column {unknown!r} to ignore",
             suggest_names(unknown, list(dict.fromkeys(names))),
         )
@@ -558,7 +558,7 @@ def _collect_columns(
             f"each column once (import csv --ignore {name!r} leaves out those that "
             "nobody needs)"
         )
-        raise InputError(source, header.place, f"column {name!r} twice", allowed)
+        raise InputError(source, header.origin, f"column {name!r} twice", allowed)
     return columns
 
 

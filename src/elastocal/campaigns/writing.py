@@ -1,5 +1,5 @@
-"""Write a campaign's folder, which is never half a campaign, and templates of
-``campaign.yaml`` and of a sheet."""
+"""Write the folder of a campaign atomically, and templates of ``campaign.yaml`` and of
+a sheet."""
 
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from elastocal.campaigns.campaign import DOCUMENT
+from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, DOCUMENT
 from elastocal.campaigns.measurements import (
     CSV,
     PARQUET,
@@ -74,51 +74,55 @@ def format_campaign_template(
     robot : robot of the file robot.yaml in the same folder.
     targets, measured : as in the measurements of the folder.
     """
+    end_effector = robot.chain.end_effector.name
     document = {
         "campaign": name,
         "robot": "robot.yaml",
         "measured": measured,
         "frame": "tracker",
         "targets": {
-            t: {"point": robot.chain.end_effector.name, "offset_m": "unknown"}
-            for t in targets or ("reflector",)
+            target: {"point": end_effector, "offset_m": "unknown"}
+            for target in targets or ("reflector",)
         },
         "compliance": "nominal" if robot.compliance_known else "identify",
         "declared": ["joint_offset", "link_geometry"],
-        "holdout": {"fraction": 0.3, "seed": 1},
+        "holdout": DEFAULT_HOLDOUT,
     }
-    text = f"# {read_schema('campaign')['title']}. Keys behind # are optional.\n"
-    for key, rule in read_schema("campaign")["properties"].items():
+    schema = read_schema("campaign")
+    text = f"# {schema['title']}. Keys behind # are optional.\n"
+    for key, rule in schema["properties"].items():
         meaning = textwrap.fill(
             rule.get("description", key),
             110,
             initial_indent="# ",
             subsequent_indent="# ",
         )
-        entry = (
-            f"{key}: {format_one_line(document[key])}"
-            if key in document
-            else f"# {key}: {format_one_line(rule['examples'][0])}"
-        )
+        if key in document:
+            entry = f"{key}: {format_one_line(document[key])}"
+        else:
+            entry = f"# {key}: {format_one_line(rule['examples'][0])}"
         text += f"\n{meaning}\n{entry}\n"
     return text
 
 
+# Beginnings of the names of optional columns, which a sheet to fill in does not have.
+_OPTIONAL_COLUMNS = (
+    "session",
+    "approach",
+    "time_s",
+    "temperature_c",
+    "u95_m",
+    "rx",
+    "ry",
+    "rz",
+)
+
+
 def format_sheet_header(joints: int) -> str:
     """Return the header of a measurements.csv to fill in, without optional columns."""
-    optional = (
-        "session",
-        "approach",
-        "time_s",
-        "temperature_c",
-        "u95_m",
-        "rx",
-        "ry",
-        "rz",
-    )
-    return (
-        ",".join(
-            name for name in describe_columns(joints) if not name.startswith(optional)
-        )
-        + "\n"
-    )
+    names = [
+        name
+        for name in describe_columns(joints)
+        if not name.startswith(_OPTIONAL_COLUMNS)
+    ]
+    return ",".join(names) + "\n"

@@ -111,9 +111,9 @@ def check(folder: Annotated[Path, Argument(help="Folder of the campaign.")]) -> 
     """
     from rich.console import Console
 
-    from elastocal.loop.overview import overview
+    from elastocal.loop.overview import inspect_campaign
 
-    report = overview(folder, find_robots_folder())
+    report = inspect_campaign(folder, find_robots_folder())
     if report.diagnosable:
         testable = format_count(report.testable, "candidate effect")
         answer = f"{report.campaign} can be diagnosed: {testable} can be tested"
@@ -188,7 +188,9 @@ def _check_path(folder: Path, path: str) -> None:
 def _print_outcome(folder: Path, workplace: Path, console: Console) -> None:
     """Print the outcome of a diagnosis that is up to date."""
     from elastocal.campaigns.campaign_folder import read_campaign_folder
-    from elastocal.report.outcome import outcome
+    from elastocal.report.outcome import describe_outcome
 
     name = read_campaign_folder(folder, find_robots_folder()).name
-    print_lines(outcome([f"reports/loop/{name}/report.pdf"], workplace), console)
+    print_lines(
+        describe_outcome([f"reports/loop/{name}/report.pdf"], workplace), console
+    )

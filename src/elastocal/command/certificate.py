@@ -45,7 +45,7 @@ def certificate(
 
     from elastocal.io.atomic_writes import check_places
     from elastocal.loop import calibrated_files
-    from elastocal.report.certificate import certificate_facts
+    from elastocal.report.certificate import collect_certificate_facts
 
     console = Console(stderr=True)
     tolerance_m = parse_length_m("--tolerance", tolerance)
@@ -61,8 +61,8 @@ def certificate(
             "a campaign whose data are in order; its report says what is wrong",
         )
     with console.status("working"):
-        document = calibrated_files.certificate(campaign, tolerance_m, risk)
-        facts = certificate_facts(document)
+        document = calibrated_files.build_certificate(campaign, tolerance_m, risk)
+        facts = collect_certificate_facts(document)
         _write_certificate(report, document, facts)
     passed = facts["decision"] == "pass"
     warnings = [f"! {error['sentence']}" for error in document["misplaced"]]

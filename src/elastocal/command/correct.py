@@ -72,7 +72,7 @@ def correct(
         describe_path_warnings,
         describe_regression,
     )
-    from elastocal.exchange.target_path import read_target_path_of
+    from elastocal.exchange.target_path import read_target_path_for
 
     console = Console(stderr=True)
     program = _plan_program(output, language, axes)
@@ -80,7 +80,7 @@ def correct(
     campaign = load_diagnosed_campaign(folder)
     robot = campaign.calibrated.robot
     axis_names = program.name_axes(robot) if program else ()
-    wanted = read_target_path_of(path, robot)
+    wanted = read_target_path_for(path, robot)
     with console.status("correcting"):
         corrected = correct_path(
             campaign.calibrated, wanted, path, allow_large_steps=allow_large_steps

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.application.exported import FoldedRobot
     from elastocal.exchange.urdf_writing import CorrectedUrdf
-    from elastocal.loop.calibrated_files import Diagnosed
+    from elastocal.loop.calibrated_files import DiagnosedCampaign
 
 ROBOT = "robot.yaml"
 URDF = "robot.urdf"
@@ -58,7 +58,7 @@ def export(
         )
     campaign = load_diagnosed_campaign(folder)
     # No file can hold the regression, so the files are of the robot without it.
-    calibrated = campaign.by_physics().calibrated
+    calibrated = campaign.without_regression().calibrated
     nominal = calibrated.robot
     folded = fold_effects(calibrated)
     states = campaign.case.observations.states
@@ -86,7 +86,7 @@ def export(
 
 
 def _describe_losses(
-    campaign: Diagnosed,
+    campaign: DiagnosedCampaign,
     exported: CalibratedRobot,
     folded: FoldedRobot,
     reported_angles: np.ndarray,

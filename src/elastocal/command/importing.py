@@ -20,7 +20,7 @@ from elastocal.errors import InputError
 
 if TYPE_CHECKING:
     from elastocal.exchange.measurement_table import ImportedMeasurements
-    from elastocal.exchange.robot_text import Imported
+    from elastocal.exchange.robot_text import ImportedRobot
 
 importing = typer.Typer(name="import", no_args_is_help=True)
 _Output = Annotated[Path, Option("--output", "-o", help="The robot file to write.")]
@@ -60,7 +60,7 @@ def urdf(
     from elastocal.exchange.robot_text import refuse_existing
     from elastocal.exchange.urdf import robot_from_urdf
 
-    refuse_existing(output, force)
+    refuse_existing(output, force=force)
     _write_robot(robot_from_urdf(file, base, tip, point or ()), output)
 
 
@@ -115,9 +115,9 @@ def dh(
     from elastocal.exchange.dh import DhOptions, robot_from_dh
     from elastocal.exchange.robot_text import refuse_existing
 
-    refuse_existing(output, force)
+    refuse_existing(output, force=force)
     options = DhOptions(angles, lengths, decimal, tuple(ignore or ()))
-    _write_robot(robot_from_dh(file, modified, options, name), output)
+    _write_robot(robot_from_dh(file, options, modified=modified, name=name), output)
 
 
 @importing.command(
@@ -254,14 +254,14 @@ def csv(
     print_lines(lines, Console())
 
 
-def _write_robot(result: Imported, output: Path) -> None:
+def _write_robot(result: ImportedRobot, output: Path) -> None:
     """Write the robot file, and print what was read."""
     from rich.console import Console
 
-    from elastocal.exchange.robot_text import summary, write_robot
+    from elastocal.exchange.robot_text import summarize_import, write_robot
 
     write_robot(result, output)
-    print_lines([*summary(result), f"written: {output.as_posix()}"], Console())
+    print_lines([*summarize_import(result), f"written: {output.as_posix()}"], Console())
 
 
 def _check_replaceable(folder: Path, *, force: bool) -> None:

@@ -333,11 +333,11 @@ def _write_campaign(
     from elastocal.io.data_frames import write_csv
     from elastocal.io.documents import LARGEST_BYTES
     from elastocal.io.texts import read_text
-    from elastocal.report.plan_pages import plan_facts
+    from elastocal.report.plan_pages import collect_plan_facts
 
     survey = planned.survey
     table = build_sheet(survey, planned.chosen)
-    facts = plan_facts(survey, planned.chosen, table, sentences)
+    facts = collect_plan_facts(survey, planned.chosen, table, sentences)
     document = build_campaign_document(folder.name, ROBOT, survey, planned.chosen)
     with write_together(folder, (ROBOT, CSV, SHEET, PICTURE, DOCUMENT)) as partial:
         write_text(partial / ROBOT, read_text(robot_file, LARGEST_BYTES))

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import numpy as np
     from rich.console import Console
 
-    from elastocal.loop.calibrated_files import Diagnosed
+    from elastocal.loop.calibrated_files import DiagnosedCampaign
 
 _METRES = {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "m": 1.0}
 _RADIANS = {
@@ -190,19 +190,19 @@ def _find_checkout() -> Path | None:
     return None
 
 
-def load_diagnosed_campaign(folder: Path) -> Diagnosed:
+def load_diagnosed_campaign(folder: Path) -> DiagnosedCampaign:
     """Load a campaign with the results of its diagnosis, as `load_diagnosed`.
 
     Results of other versions of libraries come with a warning.
     """
     from rich.console import Console
 
-    from elastocal.io.origin import environment
+    from elastocal.io.origin import list_versions
     from elastocal.loop.calibrated_files import load_diagnosed
 
     campaign = load_diagnosed(folder, find_robots_folder(), find_workplace())
     then = campaign.origin["environment"]
-    now = environment(find_pipeline())
+    now = list_versions(find_pipeline())
     changed = [name for name in sorted(then | now) if then.get(name) != now.get(name)]
     if changed:
         warning = (

@@ -169,7 +169,7 @@ class _AverageBayesFactor:
         smallest = [max(term.smallest - 1, 0) for term in alternatives]
         scales = slice(min(smallest), None)
         log_weights = [
-            self.problem.grid.log_weights_between(first, term.largest)[scales]
+            self.problem.grid.log_weights_by_range[first, term.largest][scales]
             for first, term in zip(smallest, alternatives, strict=True)
         ]
         variances = self._variances[scales, None]

@@ -30,7 +30,6 @@ from elastocal.diagnosis.gross_errors import (
     find_gross_errors,
 )
 from elastocal.diagnosis.search import screen_terms, search_models
-from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.training_verdict import TrainingResult, state_training_verdict
 from elastocal.diagnosis.verdict import Evidence
 from elastocal.effects.catalogue import list_effects
@@ -52,9 +51,7 @@ if TYPE_CHECKING:
 
     from elastocal.campaigns.campaign import Measurements
     from elastocal.data_checks.protocol import Fault
-    from elastocal.diagnosis.alarm import Alarm
-    from elastocal.diagnosis.candidate_design import CandidateDesign
-    from elastocal.diagnosis.search import Posterior, ScoredModel
+    from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.noise import Noise
     from elastocal.verdict import RepeatableResidual, TrainingVerdict
@@ -113,7 +110,7 @@ class Diagnosis:
     evidence: Evidence | None
     verdict: TrainingVerdict = field(repr=False)
     left_out: Measurements
-    settings: Settings = field(default_factory=Settings, repr=False)
+    settings: Settings = field(repr=False)
 
     @cached_property
     def document(self) -> dict[str, Any]:
@@ -145,7 +142,7 @@ class _Context:
 
 @dataclass(frozen=True)
 class _SearchRound:
-    """Where a round of the search starts.
+    """Start of one round of a search.
 
     Attributes
     ----------
@@ -166,12 +163,12 @@ class _SearchRound:
     reference: Fit
     named: tuple[str, ...] | None
     max_pose_error_rad: float = np.inf
-    tested: tuple[Fit, RepeatableResidual | None] | None = None
+    tested: tuple[Fit | None, RepeatableResidual | None] = (None, None)
 
 
 @dataclass(frozen=True)
 class _RowRound:
-    """Where a search with some of the rows starts.
+    """Start of a search with a selection of the rows.
 
     Attributes
     ----------
@@ -181,18 +178,14 @@ class _RowRound:
         Rows to fit.
     readmitted
         (N,) of bool, rows that stay because a model without them explained them.
-    reference, named
-        As of `_SearchRound`; `reference` is None for the declared model.
-    max_pose_error_rad
-        As of `_SearchRound`.
+    search
+        Start of the search.
     """
 
     number: int
     subset: FittedSubset
     readmitted: np.ndarray
-    reference: Fit | None = None
-    named: tuple[str, ...] | None = None
-    max_pose_error_rad: float = np.inf
+    search: _SearchRound
 
 
 @dataclass(frozen=True)
@@ -217,18 +210,6 @@ class _SettledRows:
     fitted: Fit
 
 
-@dataclass(frozen=True)
-class _Outcome:
-    """The model that is kept, and what has to be said about it; see `TrainingResult`."""
-
-    steps: list[Step]
-    full_model: Fit
-    evidence: Evidence | None
-    warnings: list[str]
-    contradictions: list[str]
-    repeatable: RepeatableResidual | None
-
-
 def diagnose(
     case: Case,
     settings: Settings,
@@ -249,59 +230,31 @@ def diagnose(
         Called with a line after each stage.
     """
     report = progress or (lambda line: None)
-    campaign = case.campaign
-    subset, data_faults = _select_first_subset(case, settings)
-    count = format_count(len(subset.case.observations), "measurement")
-    report(f"declared model fitted to {count}")
-    if data_faults:
-        outliers = OutlierTest.none(len(subset.kept), case.model.rows)
-        rows = _SettledRows(subset, outliers, None, subset.declared)
-    else:
-        case = replace(case, model=subset.case.model)
-        rows = _settle_rows(_Context(case, settings, seed, report), subset)
-    outcome = _choose_model(rows, settings, seed)
-    subset = rows.subset
-    outliers = replace(rows.outliers, gross=~subset.kept)
-    training_verdict = state_training_verdict(
-        TrainingResult(
-            case=subset.case,
-            noise=subset.noise,
-            steps=tuple(outcome.steps),
-            full_model=outcome.full_model,
-            evidence=outcome.evidence,
-            faults=data_faults,
-            warnings=tuple(outcome.warnings),
-            contradictions=tuple(outcome.contradictions),
-            repeatable=outcome.repeatable,
-            gross_errors=tuple(
-                describe_gross_errors(outliers, campaign, held_out=False)
-            ),
-        ),
-        settings,
-    )
-    left_out = campaign.measurements.select(outliers.gross)
-    return Diagnosis(
-        subset.case,
-        tuple(outcome.steps),
-        outcome.evidence,
-        training_verdict,
-        left_out,
-        settings,
-    )
-
-
-def _select_first_subset(
-    case: Case, settings: Settings
-) -> tuple[FittedSubset, Sequence[Fault]]:
-    """Select the rows of the first search, and look for faults of the data."""
     subset = select_initial_subset(case, settings)
     data_faults = find_faults(subset.case.campaign)
     if data_faults:
         # If the whole data set has a fault, such as a wrong unit or frame, do not look
         # for single bad rows.
         every_row = np.ones(len(case.campaign.measurements), bool)
-        return fit_subset(case, every_row, settings), data_faults
-    return choose_centre_prior(subset, settings), []
+        subset = fit_subset(case, every_row, settings)
+    else:
+        subset = choose_centre_prior(subset, settings)
+    count = format_count(len(subset.case.observations), "measurement")
+    report(f"declared model fitted to {count}")
+    context = _Context(replace(case, model=subset.case.model), settings, seed, report)
+    outliers = OutlierTest.none(len(subset.kept), case.model.rows)
+    rows = _SettledRows(subset, outliers, None, subset.declared)
+    if not data_faults:
+        rows = _settle_rows(context, subset)
+    result = _choose_model(context, rows, data_faults)
+    return Diagnosis(
+        result.case,
+        result.steps,
+        result.evidence,
+        state_training_verdict(result, settings),
+        case.campaign.measurements.select(~rows.subset.kept),
+        settings,
+    )
 
 
 def _settle_rows(context: _Context, subset: FittedSubset) -> _SettledRows:
@@ -312,7 +265,10 @@ def _settle_rows(context: _Context, subset: FittedSubset) -> _SettledRows:
     of one search are released before the next search allocates its own.
     """
     state: _RowRound | _SettledRows = _RowRound(
-        0, subset, np.zeros(len(subset.kept), bool)
+        0,
+        subset,
+        np.zeros(len(subset.kept), bool),
+        _SearchRound(0, subset.declared, None),
     )
     while isinstance(state, _RowRound):
         state = _search_and_judge_rows(context, state)
@@ -326,9 +282,8 @@ def _search_and_judge_rows(
     next search if other rows change the model."""
     case = context.case
     settings = context.settings
-    measurements = case.campaign.measurements
     subset = start.subset
-    evidence = _search_until_settled(context, start)
+    evidence = _search_until_settled(context, subset, start.search)
     fitted = evidence.fitted
     outliers = OutlierTest.none(len(subset.kept), case.model.rows)
     # A row that a model without it explains stays, whatever the next model says of it.
@@ -336,7 +291,7 @@ def _search_and_judge_rows(
     readmitted = start.readmitted.copy()
     for number in range(start.number, settings.gross_error_rounds):
         outliers = find_gross_errors(
-            fitted, subset.noise, measurements, subset.kept, settings
+            fitted, subset.noise, case.campaign.measurements, subset.kept, settings
         )
         readmitted |= ~subset.kept & ~outliers.gross
         remaining = ~outliers.gross | readmitted
@@ -348,7 +303,7 @@ def _search_and_judge_rows(
         sample = sample_for_search(case, case.select(remaining), settings)
         fitted = _refit_from(fitted, sample, fitted.noise, INTERMEDIATE_TOLERANCE)
         outliers = find_gross_errors(
-            fitted, subset.noise, measurements, remaining, settings
+            fitted, subset.noise, case.campaign.measurements, remaining, settings
         )
         readmitted |= ~remaining & ~outliers.gross
         previous = subset
@@ -356,17 +311,20 @@ def _search_and_judge_rows(
         if subset is previous:
             break
         count = format_count((~subset.kept).sum(), "gross error")
-        total = format_count(len(readmitted), "row")
-        context.report(f"{count} in {total}: once more without")
-        if serialize_noise(subset.noise) != serialize_noise(previous.noise):
-            return _restart_search(number + 1, subset, readmitted, evidence, fitted)
+        context.report(
+            f"{count} in {format_count(len(readmitted), 'row')}: once more without"
+        )
         refitted = fitted
-        if (subset.kept != remaining).any():
+        has_same_noise = serialize_noise(subset.noise) == serialize_noise(
+            previous.noise
+        )
+        if has_same_noise and (subset.kept != remaining).any():
             refitted = _refit_from(
                 fitted, subset.search_sample, fitted.noise, INTERMEDIATE_TOLERANCE
             )
-        if not _is_shift_negligible(evidence.fitted, refitted):
-            return _restart_search(number + 1, subset, readmitted, evidence, fitted)
+        if not has_same_noise or not _is_shift_negligible(evidence.fitted, refitted):
+            search = _restart_search(subset, evidence, fitted)
+            return _RowRound(number + 1, subset, readmitted, search)
         fitted = refitted
     return _SettledRows(subset, outliers, evidence, fitted)
 
@@ -383,26 +341,20 @@ def _is_shift_negligible(searched: Fit, refitted: Fit) -> bool:
 
 
 def _restart_search(
-    number: int,
-    subset: FittedSubset,
-    readmitted: np.ndarray,
-    evidence: Evidence,
-    fitted: Fit,
-) -> _RowRound:
+    subset: FittedSubset, evidence: Evidence, fitted: Fit
+) -> _SearchRound:
     """Start the next search at the model found so far if the last one was linearised
     about a model that it had found; starting at the declared model would repeat the
     same steps."""
-    design = evidence.linearized
+    design = evidence.design
     declared_effects = subset.declared.model.effects
-    relinearized = len(design.reference_fit.model.effects) > len(declared_effects)
-    return _RowRound(
-        number,
-        subset,
-        readmitted,
-        fitted if relinearized else None,
-        evidence.conclusion.best.named if relinearized else None,
-        design.max_pose_error_rad,
+    if len(design.reference_fit.model.effects) <= len(declared_effects):
+        return _SearchRound(0, subset.declared, None, design.max_pose_error_rad)
+    reference = _refit_from(
+        fitted, subset.search_sample, fitted.noise, INTERMEDIATE_TOLERANCE
     )
+    named = evidence.conclusion.best.named
+    return _SearchRound(1, reference, named, design.max_pose_error_rad)
 
 
 def _refit_from(
@@ -420,25 +372,17 @@ def _refit_from(
     )
 
 
-def _search_until_settled(context: _Context, start: _RowRound) -> Evidence:
-    """Search about the declared model, or the one to start from, and again about the
-    model found while that, or its noise, is far from the one before.
+def _search_until_settled(
+    context: _Context, subset: FittedSubset, start: _SearchRound
+) -> Evidence:
+    """Search about one model, and again about the model found while that, or its noise,
+    is far from the one before.
 
     As in `_settle_rows`, a round releases its statistics before the next one starts.
     """
-    state: _SearchRound | Evidence
-    if start.reference is None:
-        state = _SearchRound(0, start.subset.declared, None, start.max_pose_error_rad)
-    else:
-        reference = _refit_from(
-            start.reference,
-            start.subset.search_sample,
-            start.reference.noise,
-            INTERMEDIATE_TOLERANCE,
-        )
-        state = _SearchRound(1, reference, start.named, start.max_pose_error_rad)
+    state: _SearchRound | Evidence = start
     while isinstance(state, _SearchRound):
-        state = _run_search_round(context, start.subset, state)
+        state = _run_search_round(context, subset, state)
     return state
 
 
@@ -454,15 +398,11 @@ def _run_search_round(
     """
     settings = context.settings
     sample = subset.search_sample
-    design, posterior, alarm = _search(context, subset, start)
-    conclusion = verdict.conclude(design.problem, posterior, alarm)
-    named = conclusion.best.named
-    model = posterior.empty_model
-    if named:
-        model = posterior.models[conclusion.best.model]
-    _report_leading(context, start.number, conclusion.best.mechanisms)
-    fitted = _fit_model_found(subset, start, design, model)
-    is_linear = _is_linear(start, fitted, alarm, named, settings)
+    evidence = _search(context, subset, start)
+    fitted = evidence.fitted
+    named = evidence.conclusion.best.named
+    model = evidence.named_model
+    is_linear = _is_linear(start, evidence, settings)
     # A residual that depends on the joint angles is not random pose error. Test for it
     # again whenever the model has changed.
     has_large_pose_error = model.pose_error_rad > settings.pose_repeatability_rad
@@ -477,53 +417,19 @@ def _run_search_round(
         max_pose_error_rad = settings.pose_repeatability_rad
         if has_large_pose_error:
             noise = refit.limit_pose_error(fitted, sample, max_pose_error_rad)
-            fitted = _refit_from(fitted, sample, noise, _choose_tolerance(subset))
+            fitted = _refit_from(fitted, sample, noise, subset.search_tolerance)
     settled = is_linear and not remains
     if settled or start.number + 1 >= settings.linearizations:
         adopted = bool(named) and model_averaging.is_expected_to_help(
-            design.problem, posterior, model
+            evidence.design.problem, evidence.posterior, model
         )
-        return Evidence(
-            design, posterior, alarm, conclusion, adopted, settled, fitted, tested
+        return replace(
+            evidence, adopted=adopted, settled=settled, fitted=fitted, tested=tested
         )
     return _SearchRound(start.number + 1, fitted, named, max_pose_error_rad, tested)
 
 
-def _choose_tolerance(subset: FittedSubset) -> float:
-    """Tolerance of a fit to the search sample, which is intermediate if a fit to all
-    observations follows."""
-    if subset.search_sample is subset.case.observations:
-        return CONVERGENCE_TOLERANCE
-    return INTERMEDIATE_TOLERANCE
-
-
-def _fit_model_found(
-    subset: FittedSubset,
-    start: _SearchRound,
-    design: CandidateDesign,
-    model: ScoredModel,
-) -> Fit:
-    """Fit the model that a search found, under the noise that it leaves."""
-    noise = refit.estimate_residual_noise(
-        design.problem, model, start.reference.noise, subset.declared.noise
-    )
-    return refit.fit_selected_effects(
-        subset.declared,
-        subset.search_sample,
-        noise,
-        refit.select_effects(design, model),
-        start.reference if start.named else None,
-        tolerance=_choose_tolerance(subset),
-    )
-
-
-def _is_linear(
-    start: _SearchRound,
-    fitted: Fit,
-    alarm: Alarm,
-    named: tuple[str, ...],
-    settings: Settings,
-) -> bool:
+def _is_linear(start: _SearchRound, evidence: Evidence, settings: Settings) -> bool:
     """Whether the problem was linear enough at the point of linearisation.
 
     The noise must not be far above the one by which the problem was whitened, because
@@ -531,46 +437,62 @@ def _is_linear(
     is missing, that the same effects were named before, or that the exact fit keeps
     what the linear problem promised.
     """
-    whitening_noise = start.reference.noise
-    ratio = settings.relinearize_noise
-    if fitted.noise.position_m > ratio * whitening_noise.position_m:
+    noise_ratio = evidence.fitted.noise.position_m / start.reference.noise.position_m
+    named = evidence.conclusion.best.named
+    if noise_ratio > settings.relinearize_noise:
         return False
-    if not named or alarm.statistic < settings.relinearize_above:
+    if evidence.alarm.statistic < settings.relinearize_above:
         return True
-    if named == start.named:
+    if named in ((), start.named):
         return True
-    misfit = abs(refit.compute_reduced_chi_square(fitted) - 1.0)
+    misfit = abs(refit.compute_reduced_chi_square(evidence.fitted) - 1.0)
     return misfit < settings.linear_misfit
 
 
-def _search(
-    context: _Context, subset: FittedSubset, start: _SearchRound
-) -> tuple[CandidateDesign, Posterior, Alarm]:
-    """Linearise about a model, test whether anything is missing, and search. The rows
-    of the design are released."""
+def _search(context: _Context, subset: FittedSubset, start: _SearchRound) -> Evidence:
+    """Linearise about a model, test whether anything is missing, search, and fit the
+    model found under the noise that it leaves."""
     settings = context.settings
-    candidates = list(subset.case.candidates.values())
     design = build_candidate_design(
         start.reference,
         subset.search_sample,
-        candidates,
+        list(subset.case.candidates.values()),
         settings,
         start.max_pose_error_rad,
     )
     empty_model, log_bayes_factors = screen_terms(design.problem)
-    generator = open_stream(
+    stream = open_stream(
         context.seed, subset.case.campaign.name, "null distribution", start.number
     )
     alarm = run_alarm_test(
-        design.problem, design.products, empty_model.pose_error_rad, generator
+        design.problem, design.products, empty_model.pose_error_rad, stream
     )
     # The alarm comes before the measurements choose the shapes that are refined; after
     # that choice it would no longer be exact.
     if alarm.raised:
         design = refine_shapes(design, log_bayes_factors)
-    known = {effect.key for effect in start.reference.model.effects}
-    posterior = search_models(design.problem, known)
-    return design.without_rows, posterior, alarm
+    reference_keys = {effect.key for effect in start.reference.model.effects}
+    posterior = search_models(design.problem, reference_keys)
+    # Release the rows before the fit allocates its own.
+    design = design.without_rows
+    conclusion = verdict.conclude(design.problem, posterior, alarm)
+    evidence = Evidence(design, posterior, alarm, conclusion, start.reference)
+    _report_leading(context, start.number, conclusion.best.mechanisms)
+    noise = refit.estimate_residual_noise(
+        design.problem,
+        evidence.named_model,
+        start.reference.noise,
+        subset.declared.noise,
+    )
+    fitted = refit.fit_selected_effects(
+        subset.declared,
+        subset.search_sample,
+        noise,
+        refit.select_effects(design, evidence.named_model),
+        start.reference if start.named else None,
+        tolerance=subset.search_tolerance,
+    )
+    return replace(evidence, fitted=fitted)
 
 
 def _report_leading(
@@ -587,63 +509,86 @@ def _report_leading(
     context.report(f"search {number + 1} of at most {limit}: leading so far, {leading}")
 
 
-def _choose_model(rows: _SettledRows, settings: Settings, seed: int) -> _Outcome:
+def _choose_model(
+    context: _Context, rows: _SettledRows, data_faults: Sequence[Fault]
+) -> TrainingResult:
     """Fit the frames, the declared model and the effects found, and choose the model
     that is kept."""
     subset = rows.subset
-    observations = subset.case.observations
     declared = subset.fit_to_all(subset.declared)
     frames = fit_model(
         replace(subset.case.model, effects=()),
-        observations,
+        subset.case.observations,
         subset.noise,
         tolerance=INTERMEDIATE_TOLERANCE,
     )
-    steps = [
-        Step("frames and targets", "frames", frames),
-        Step("declared model", "declared", declared),
-    ]
-    evidence = rows.evidence
-    if evidence is None:
-        return _Outcome(steps, declared, None, subset.warnings, [], None)
+    outliers = replace(rows.outliers, gross=~subset.kept)
+    gross_errors = describe_gross_errors(
+        outliers, context.case.campaign, held_out=False
+    )
+    result = TrainingResult(
+        case=subset.case,
+        noise=subset.noise,
+        steps=(
+            Step("frames and targets", "frames", frames),
+            Step("declared model", "declared", declared),
+        ),
+        full_model=declared,
+        evidence=None,
+        faults=data_faults,
+        warnings=tuple(subset.warnings),
+        contradictions=(),
+        repeatable=None,
+        gross_errors=tuple(gross_errors),
+    )
+    if rows.evidence is None:
+        return result
+    return _add_effects(context, rows, rows.evidence, result)
+
+
+def _add_effects(
+    context: _Context, rows: _SettledRows, evidence: Evidence, result: TrainingResult
+) -> TrainingResult:
+    """Keep the effects found, the declared model, or frames and targets alone,
+    whichever predicts best."""
+    subset = rows.subset
+    observations = subset.case.observations
+    frames, declared = (step.fitted for step in result.steps)
     full_model = rows.fitted
     if full_model is not evidence.fitted or subset.search_sample is not observations:
         full_model = subset.fit_to_all(full_model)
     named = evidence.conclusion.best.named
-    oversized = find_oversized_effects(full_model, named)
-    conclusion = verdict.allow_related_mechanisms(evidence.conclusion, oversized)
+    conclusion = verdict.allow_related_mechanisms(
+        evidence.conclusion, find_oversized_effects(full_model, named)
+    )
+    compared = [declared, full_model]
     if not evidence.adopted:
-        alone = full_model
+        compared = [full_model]
         if named:
-            alone = _refit_declared(evidence, declared, observations)
-        steps[-1] = replace(steps[-1], fitted=alone)
-    compared = [steps[-1].fitted]
-    if evidence.adopted:
-        compared.append(full_model)
-    losses = _describe_losses(frames, compared, observations, settings)
+            compared = [_refit_declared(evidence, declared, observations)]
+    losses = _describe_losses(frames, compared, observations, context.settings)
     evidence = replace(
         evidence, conclusion=conclusion, adopted=evidence.adopted and not losses
     )
+    steps = [result.steps[0], Step("declared model", "declared", compared[0])]
     if evidence.adopted:
         steps += _effect_steps(subset, full_model, evidence)
     elif losses and losses[0]:
-        kept = fit_model(
-            frames.model, observations, steps[-1].fitted.noise, frames.estimate
-        )
+        kept = fit_model(frames.model, observations, compared[0].noise, frames.estimate)
         steps.append(Step("frames and targets, kept", "kept", kept))
-    return _contradict(
-        _Outcome(
-            steps,
-            full_model,
-            evidence,
-            [*subset.warnings, *filter(None, losses)],
-            [],
-            _test_repeatable(evidence, steps[-1].fitted, observations, seed),
-        ),
-        evidence,
-        subset.noise,
-        settings,
+    tested_fit, repeatable = evidence.tested
+    if tested_fit is not steps[-1].fitted:
+        repeatable = detect_repeatable_residual(
+            steps[-1].fitted, observations, context.seed
+        )
+    result = replace(
+        result,
+        steps=tuple(steps),
+        full_model=full_model,
+        warnings=(*result.warnings, *filter(None, losses)),
+        repeatable=repeatable,
     )
+    return _contradict(result, evidence, context.settings)
 
 
 def _refit_declared(
@@ -651,52 +596,40 @@ def _refit_declared(
 ) -> Fit:
     """Fit the declared model under the noise that it leaves by itself, because no
     effect is adopted."""
-    design = evidence.linearized
     noise = refit.estimate_residual_noise(
-        design.problem,
+        evidence.design.problem,
         evidence.posterior.empty_model,
-        design.reference_fit.noise,
+        evidence.design.reference_fit.noise,
         declared.noise,
     )
     return _refit_from(declared, observations, noise, CONVERGENCE_TOLERANCE)
 
 
-def _test_repeatable(
-    evidence: Evidence, kept: Fit, observations: Observations, seed: int
-) -> RepeatableResidual | None:
-    """Test whether the kept model leaves a function of the joints, unless the search
-    tested that fit."""
-    if evidence.tested is not None and evidence.tested[0] is kept:
-        return evidence.tested[1]
-    return detect_repeatable_residual(kept, observations, seed)
-
-
 def _contradict(
-    outcome: _Outcome, evidence: Evidence, noise: Noise, settings: Settings
-) -> _Outcome:
+    result: TrainingResult, evidence: Evidence, settings: Settings
+) -> TrainingResult:
     """Withdraw a verdict of adequacy if something contradicts it, and warn."""
-    kept = outcome.steps[-1].fitted
-    repeatable_warnings = verdict.describe_repeatable_residual(outcome.repeatable)
+    repeatable_warnings = verdict.describe_repeatable_residual(result.repeatable)
     conclusion = evidence.conclusion
     contradictions: list[str] = []
     if conclusion.verdict in (verdict.ADEQUATE, verdict.NOT_TESTABLE):
         contradictions = repeatable_warnings
     if conclusion.verdict == verdict.ADEQUATE and not contradictions:
         contradictions = verdict.find_contradictions(
-            outcome.full_model, noise, settings
+            result.full_model, result.noise, settings
         )
     if contradictions:
         conclusion = replace(conclusion, verdict=verdict.UNEXPLAINED)
-    warnings = [*contradictions, *outcome.warnings]
+    warnings = [*contradictions, *result.warnings]
     if not repeatable_warnings:
         warnings += verdict.warn_of_pose_error(
-            kept.noise, evidence.linearized.pose_std_error_rad
+            result.steps[-1].fitted.noise, evidence.design.pose_std_error_rad
         )
     return replace(
-        outcome,
+        result,
         evidence=replace(evidence, conclusion=conclusion),
-        warnings=warnings,
-        contradictions=contradictions,
+        warnings=tuple(warnings),
+        contradictions=tuple(contradictions),
     )
 
 
@@ -759,15 +692,15 @@ def _effect_steps(subset: FittedSubset, final: Fit, evidence: Evidence) -> list[
     All steps but the last are fits to the search sample, because only their errors are
     shown.
     """
-    problem = evidence.linearized.problem
-    best = evidence.conclusion.best
-    model = evidence.posterior.models[best.model]
+    model = evidence.named_model
     effects = [
         (effect, final.effect_values(effect.key)[1])
-        for effect, _ in refit.select_effects(evidence.linearized, model)
+        for effect, _ in refit.select_effects(evidence.design, model)
     ]
-    explained = model_averaging.compute_explained_squares(problem, model)
-    names = sorted(best.named, key=lambda name: -explained[name])
+    explained = model_averaging.compute_explained_squares(
+        evidence.design.problem, model
+    )
+    names = sorted(evidence.conclusion.best.named, key=lambda name: -explained[name])
     single = names[:-1] if len(names) <= _MAX_STEPS else names[:1]
     together = names[len(single) :]
     last = together[0] if len(together) == 1 else f"{len(together)} further effects"

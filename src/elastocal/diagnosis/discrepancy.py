@@ -22,7 +22,7 @@ predict.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,6 +33,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from elastocal.effects.conditions import Conditions
+
+    # Values (S, F) of some features in some states.
+    StateFunction = Callable[[Conditions], np.ndarray]
 
 # Displacements that no machine would hide: about an arc minute at the joints, a tenth
 # of a millimetre and of a milliradian at the base.
@@ -78,7 +81,7 @@ class Discrepancy:
     location: tuple[int, ...]
     name: str
     size: float
-    components: tuple[tuple[int, Callable[[Conditions], np.ndarray]], ...]
+    components: tuple[tuple[int, StateFunction], ...]
     features: int
 
     @property
@@ -256,53 +259,6 @@ def _raw_inputs(conditions: Conditions, cause: str, coordinate: int) -> np.ndarr
     return np.array(inputs, float).reshape(len(inputs), states).T
 
 
-@dataclass(frozen=True)
-class _FourierFeatures:
-    """Random Fourier features of some inputs, less the parts that the catalogue names.
-
-    Attributes
-    ----------
-    inputs : inputs
-    frequency, phase : (D', F), (F,), of the waves
-    amplitude : of each wave
-    mean : (F,), part that is removed
-    slope : (F,), of the part linear in the joint angle that is removed; None for none
-    angle_center : angle at which the linear part is zero, rad
-    location : joint counted from 1, or empty
-    largest_load : if the features are in proportion to the load, its largest value in
-        the campaign
-    """
-
-    inputs: _Inputs
-    frequency: np.ndarray
-    phase: np.ndarray
-    amplitude: float
-    location: tuple[int, ...]
-    mean: np.ndarray | float = 0.0
-    slope: np.ndarray | None = None
-    angle_center: float = 0.0
-    largest_load: float | None = None
-
-    def evaluate_waves(self, conditions: Conditions) -> np.ndarray:
-        """The features (S, F) with all their parts."""
-        angle = self.inputs.evaluate(conditions) @ self.frequency + self.phase
-        return self.amplitude * np.cos(angle)
-
-    def remove_named_parts(
-        self, waves: np.ndarray, conditions: Conditions
-    ) -> np.ndarray:
-        """Remove from the features (S, F) the parts that the catalogue names, and make
-        them proportional to the load if they are so."""
-        waves = waves - self.mean
-        if self.slope is not None:
-            angle = conditions.joint_angles[:, self.inputs.coordinate]
-            waves -= np.outer(angle - self.angle_center, self.slope)
-        if self.largest_load is not None:
-            load = _load(conditions, self.location)
-            waves = waves * (load / self.largest_load)[:, None]
-        return waves
-
-
 def _draw_functions(
     campaign: Conditions,
     inputs: _Inputs,
@@ -310,30 +266,24 @@ def _draw_functions(
     draws: np.random.Generator,
     *,
     loaded: bool,
-) -> Callable[[Conditions], np.ndarray]:
-    """Draw random functions of some inputs: principal components over a campaign.
-
-    Returns a function that gives them (S, count) in some states.
-    """
-    count = kind.features_by_load[loaded]
-    features = _draw_features(inputs, kind, draws)
-    waves = features.evaluate_waves(campaign)
-    features = _name_parts(features, waves, campaign, loaded=loaded)
-    waves = features.remove_named_parts(waves, campaign)
-    _, vectors = np.linalg.eigh(waves.T @ waves)
-    axes = vectors[:, ::-1][:, :count]
-
-    def components(conditions: Conditions) -> np.ndarray:
-        waves = features.evaluate_waves(conditions)
-        return features.remove_named_parts(waves, conditions) @ axes
-
-    return components
+) -> StateFunction:
+    """Draw random functions of some inputs: the principal components, over a campaign,
+    of random Fourier features without the parts that the catalogue names."""
+    waves = _draw_waves(inputs, kind, draws)
+    remove_named_parts = _fit_named_parts(
+        waves(campaign), campaign, inputs, kind.location, loaded=loaded
+    )
+    features = remove_named_parts(waves(campaign), campaign)
+    _, vectors = np.linalg.eigh(features.T @ features)
+    axes = vectors[:, ::-1][:, : kind.features_by_load[loaded]]
+    return lambda conditions: remove_named_parts(waves(conditions), conditions) @ axes
 
 
-def _draw_features(
+def _draw_waves(
     inputs: _Inputs, kind: _Kind, draws: np.random.Generator
-) -> _FourierFeatures:
-    """Draw Fourier features whose sum over features and loads has unit variance."""
+) -> StateFunction:
+    """Draw Fourier features (S, F) whose sum over features and loads has unit
+    variance."""
     count = int(inputs.varies.sum())
     low, high = np.log(_LENGTH_SCALES)
     lengths = np.exp(draws.uniform(low, high, _RANDOM_FEATURES))
@@ -341,41 +291,59 @@ def _draw_features(
     phase = draws.uniform(0, 2 * np.pi, _RANDOM_FEATURES)
     variance = 1.0 / len(kind.features_by_load)
     amplitude = np.sqrt(2.0 * variance / _RANDOM_FEATURES) if count else 0.0
-    return _FourierFeatures(inputs, frequency, phase, amplitude, kind.location)
+    return lambda conditions: (
+        amplitude * np.cos(inputs.evaluate(conditions) @ frequency + phase)
+    )
 
 
-def _name_parts(
-    features: _FourierFeatures, waves: np.ndarray, campaign: Conditions, *, loaded: bool
-) -> _FourierFeatures:
-    """Find the parts of features that the catalogue names: mean, linear part and load.
+def _fit_named_parts(
+    features: np.ndarray,
+    campaign: Conditions,
+    inputs: _Inputs,
+    location: tuple[int, ...],
+    *,
+    loaded: bool,
+) -> Callable[[np.ndarray, Conditions], np.ndarray]:
+    """Fit the parts of features that the catalogue names: mean, or start, and the part
+    linear in the joint angle.
 
     Parameters
     ----------
-    features : with no part known yet
-    waves : (S, F), their values in the campaign
+    features : (S, F), their values in the campaign
     campaign : its states
+    inputs : inputs of the features
+    location : joint counted from 1; empty for the base
     loaded : whether the features are in proportion to the load
+
+    Returns
+    -------
+    Function that removes these parts from features (S, F) in some states, and makes the
+    features proportional to the load if they are so
     """
-    inputs = features.inputs
+    mean = features.mean(axis=0)
     if inputs.cause == PLACE:
         mean = np.zeros(_RANDOM_FEATURES)
-    elif inputs.cause == TIME and features.location:
+    elif inputs.cause == TIME and location:
         # What time brings a joint begins at zero.
-        mean = waves[np.argmin(inputs.evaluate(campaign)[:, -1])]
-    else:
-        mean = waves.mean(axis=0)
-    features = replace(features, mean=mean)
+        mean = features[np.argmin(inputs.evaluate(campaign)[:, -1])]
     if loaded:
-        load = np.abs(_load(campaign, features.location)).max(initial=0.0)
-        return replace(features, largest_load=max(load, _ROUNDING))
-    if inputs.cause in (OWN, NEIGHBOURS):
-        angle = campaign.joint_angles[:, inputs.coordinate]
-        center = angle.mean()
-        squares = ((angle - center) ** 2).sum()
-        if squares > _ROUNDING:
-            slope = (angle - center) @ waves / squares
-            return replace(features, slope=slope, angle_center=center)
-    return features
+        largest = max(np.abs(_load(campaign, location)).max(initial=0.0), _ROUNDING)
+        return lambda features, conditions: (
+            (features - mean) * (_load(conditions, location) / largest)[:, None]
+        )
+    if inputs.cause not in (OWN, NEIGHBOURS):
+        return lambda features, conditions: features - mean
+    angle = campaign.joint_angles[:, inputs.coordinate]
+    center = angle.mean()
+    squares = ((angle - center) ** 2).sum()
+    slope = np.zeros(_RANDOM_FEATURES)
+    if squares > _ROUNDING:
+        slope = (angle - center) @ features / squares
+    return lambda features, conditions: (
+        features
+        - mean
+        - np.outer(conditions.joint_angles[:, inputs.coordinate] - center, slope)
+    )
 
 
 def _load(conditions: Conditions, location: tuple[int, ...]) -> np.ndarray:

@@ -56,18 +56,15 @@ def state_effects(
         Observations of that fit.
     """
     conclusion = evidence.conclusion
-    problem = evidence.linearized.problem
-    names = conclusion.best.named
-    if not names:
-        return ()
-    model = evidence.posterior.models[conclusion.best.model]
-    terms = [problem.terms[index] for index in model.term_indices]
+    terms = evidence.design.problem.terms
+    candidates = [terms[index].candidate for index in evidence.named_model.term_indices]
+    names = sorted(conclusion.best.named, key=lambda name: -conclusion.mechanisms[name])
     stated = []
-    for name in sorted(names, key=lambda name: -conclusion.mechanisms[name]):
+    for name in names:
         members = [
-            term.candidate
-            for term in terms
-            if term.candidate and term.mechanism == name
+            candidate
+            for candidate in candidates
+            if candidate and candidate.effect == name
         ]
         parameters = state_largest_sag(name, members, fitted, observations)
         for member in members:
@@ -94,7 +91,7 @@ def state_effects(
 def _state_locations(evidence: Evidence, mechanism: str) -> tuple[StatedLocation, ...]:
     """State the locations of a mechanism whose probability is worth reporting."""
     probabilities = compute_location_probabilities(
-        evidence.linearized.problem, evidence.posterior, mechanism
+        evidence.design.problem, evidence.posterior, mechanism
     )
     return tuple(
         StatedLocation(format_location(mechanism, location), probability)
@@ -114,14 +111,13 @@ def format_location(mechanism: str, location: Sequence[int | str]) -> str:
         Joints or links, which begin at the joint of the same number, and details.
     """
     numbers = [str(entry) for entry in location if not isinstance(entry, str)]
-    details = [entry for entry in location if isinstance(entry, str)]
-    words = [detail for detail in details if detail]
+    phrases = [entry for entry in location if isinstance(entry, str) and entry]
     if numbers:
         noun = getattr(list_effects().get(mechanism), "part", "joint")
-        words.insert(0, f"{pluralize(noun, len(numbers))} {' and '.join(numbers)}")
-    if not words and mechanism == OTHER:
+        phrases.insert(0, f"{pluralize(noun, len(numbers))} {' and '.join(numbers)}")
+    if not phrases and mechanism == OTHER:
         return "base"
-    return " ".join(words)
+    return " ".join(phrases)
 
 
 def state_parameters(

@@ -85,11 +85,7 @@ class SizeGrid:
     def log_weights_of(self, term: ModelTerm) -> np.ndarray:
         """Log weights (S,) of the scales of one term, from its smallest to its
         largest."""
-        return self.log_weights_between(term.smallest, term.largest)
-
-    def log_weights_between(self, smallest: int, largest: int) -> np.ndarray:
-        """Log weights (S,), shared out among the scales between two indices."""
-        return self._log_weights_by_range[smallest, largest]
+        return self.log_weights_by_range[term.smallest, term.largest]
 
     def root_mean_square(self, term: ModelTerm) -> float:
         """Prior standard deviation of a coefficient of a term over all its scales, in
@@ -97,8 +93,9 @@ class SizeGrid:
         return float(np.sqrt(np.exp(self.log_weights_of(term)) @ self.scales**2))
 
     @cached_property
-    def _log_weights_by_range(self) -> np.ndarray:
-        """Log weights (S, S, S) by smallest scale, largest scale and scale."""
+    def log_weights_by_range(self) -> np.ndarray:
+        """Log weights (S, S, S) by smallest scale, largest scale and scale, shared out
+        among the scales between the two."""
         index = np.arange(len(self.scales))
         outside = (index < index[:, None, None]) | (index > index[:, None])
         weights = np.where(outside, -np.inf, self.log_weights)
@@ -230,7 +227,11 @@ def evaluate_extensions(
             eigenvalues, eigenvectors = decompose_grams(gram)
         score = model.score[:, block.columns, None]
         by_axis = (eigenvectors.swapaxes(-1, -2) @ score)[..., 0]
-        gains, occam = _integrate_coefficients(eigenvalues, by_axis**2, grid.scales**2)
+        # Integrate over the coefficients of each term at every scale.
+        variances = grid.scales**2
+        widened = 1.0 + eigenvalues[..., None] * variances
+        gains = ((by_axis**2)[..., None] * (variances / widened)).sum(axis=2)
+        occam = -0.5 * np.log(widened).sum(axis=2)
         likelihood = log_likelihood(
             model.squares[:, None, None] - gains, degrees_of_freedom
         )
@@ -288,19 +289,6 @@ def _condition_on_model(
         statistics.residual_squares - (fitted**2).sum(axis=1),
         base - log_diagonal,
     )
-
-
-def _integrate_coefficients(
-    eigenvalues: np.ndarray, squared_score: np.ndarray, variances: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Reduction of the residual sum of squares, and log Occam factor, of terms at every
-    prior variance (S,).
-
-    Both are (T, U, S); `eigenvalues` and `squared_score` along them are (T, U, d).
-    """
-    widened = 1.0 + eigenvalues[..., None] * variances
-    gains = (squared_score[..., None] * (variances / widened)).sum(axis=2)
-    return gains, -0.5 * np.log(widened).sum(axis=2)
 
 
 @dataclass(frozen=True)

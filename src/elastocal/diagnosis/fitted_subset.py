@@ -66,6 +66,14 @@ class FittedSubset:
     declared: Fit
     search_sample: Observations
 
+    @property
+    def search_tolerance(self) -> float:
+        """Tolerance of a fit to the search sample, which is intermediate if a fit to
+        all observations follows."""
+        if self.search_sample is self.case.observations:
+            return CONVERGENCE_TOLERANCE
+        return INTERMEDIATE_TOLERANCE
+
     def fit_to_all(self, fitted: Fit) -> Fit:
         """Fit a model that was fitted to the search sample to all observations.
 
@@ -77,13 +85,12 @@ class FittedSubset:
         .. [1] Bickel, One-step Huber estimates in the linear model, JASA 70, 1975.
         """
         observations = self.case.observations
-        tolerance = CONVERGENCE_TOLERANCE
-        if self.search_sample is not observations:
-            tolerance = INTERMEDIATE_TOLERANCE
-            if len(observations) > LARGE_FIT_SIZE:
-                tolerance = _LONG_FIT_TOLERANCE
-        elif fitted is self.declared:
-            return fitted
+        tolerance = self.search_tolerance
+        if self.search_sample is observations:
+            if fitted is self.declared:
+                return fitted
+        elif len(observations) > LARGE_FIT_SIZE:
+            tolerance = _LONG_FIT_TOLERANCE
         return fit_model(
             fitted.model,
             observations,
@@ -163,9 +170,10 @@ def select_initial_subset(case: Case, settings: Settings) -> FittedSubset:
     reference = evaluate_as_fit(
         subset.declared.model, sample, subset.noise, subset.declared.estimate
     )
-    candidates = list(case.candidates.values())
     unexplained = find_unexplained_observations(
-        build_candidate_design(reference, sample, candidates, settings)
+        build_candidate_design(
+            reference, sample, list(case.candidates.values()), settings
+        )
     )
     # A repeat far from the others is in no average. The declared model alone has judged
     # it.

@@ -281,7 +281,7 @@ def _format_gross_error(residual: np.ndarray, campaign: Campaign, index: int) ->
     """A sentence with the line of a row in its file, the size of its residual, and the
     cause if it shows."""
     measurements = campaign.measurements
-    line = campaign.place_of(int(measurements.row[index]))
+    line = campaign.locate_row(int(measurements.row[index]))
     distance_mm = 1e3 * float(np.linalg.norm(residual[:3]))
     size = f"{distance_mm:.3g} mm"
     if distance_mm >= 1e3:
@@ -296,5 +296,5 @@ def _format_gross_error(residual: np.ndarray, campaign: Campaign, index: int) ->
         cause = ", reads 0, 0, 0"
     elif same_position.any():
         first = int(measurements.row[np.argmax(same_position)])
-        cause = f", the same point as {campaign.place_of(first)}"
+        cause = f", the same point as {campaign.locate_row(first)}"
     return f"{line}: {size} off{cause}, left out"

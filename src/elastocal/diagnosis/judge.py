@@ -1,8 +1,8 @@
-"""The last step: every model on poses that no step has seen."""
+"""The last step of a diagnosis: judge every model by poses that no step has seen."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -33,8 +33,17 @@ from elastocal.residual_model.selection import (
     summarize_residual_model,
     validate_residual_model,
 )
-from elastocal.validation import held_out as figures
 from elastocal.validation.conformity import count_configurations, find_joint_ranges
+from elastocal.validation.held_out import (
+    METRICS,
+    PositionErrors,
+    bound_share_below_maximum,
+    compute_error_intervals,
+    compute_noise_floor,
+    compute_position_errors,
+    summarize_errors,
+    summarize_errors_by_range,
+)
 from elastocal.validation.transfer import (
     find_extrapolated_poses,
     transfer_fit,
@@ -42,27 +51,27 @@ from elastocal.validation.transfer import (
 )
 from elastocal.verdict import (
     BeforeAfter,
-    Effect,
     ErrorsByRange,
     ErrorSummary,
     HeldOut,
     JointRange,
     Remainder,
-    TrainingVerdict,
     UncalibratedErrors,
     Verdict,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from elastocal.diagnosis.diagnose import Diagnosis, Step
     from elastocal.fitting.model import Estimate, Model
+    from elastocal.verdict import Effect
 
+    TransferredFit = tuple[Model, Estimate]
+
+# Number of bootstrap replicates of the held-out poses.
 _REPLICATES = 1000
-# What warnings of errors that grew are known by.
-ABOUT_ERRORS = "of the validation poses"
-_ERRORS = {
+_METRIC_NAMES = {
     "mean_m": "mean error",
     "rms_m": "RMS error",
     "p95_m": "95th percentile of the errors",
@@ -72,12 +81,23 @@ _ERRORS = {
 
 @dataclass(frozen=True)
 class Judgement:
-    """A diagnosis with what held-out poses say of it.
+    """A diagnosis, with what the held-out poses say of it.
 
-    `verdict`: the whole verdict. `rows`: of before_after.csv. `held_out`: what
-    was held out, without its gross errors. `left_out`: these. `outside` (P,) of bool:
-    poses held out that lie outside the range of the fitted ones. `delivered`: what the
-    final model and a regression leave of the held-out poses; None where there is none.
+    Attributes
+    ----------
+    verdict
+        The whole verdict.
+    rows
+        Rows of before_after.csv, one for each step.
+    held_out
+        Held-out poses without their gross errors.
+    left_out
+        These gross errors.
+    outside
+        (P,) of bool, held-out poses outside the range of the fitted ones.
+    delivered
+        Residual of the held-out poses by the final model and a regression; None if the
+        campaign asks for no regression.
     """
 
     verdict: Verdict
@@ -97,103 +117,119 @@ class Judgement:
 def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
     """Open the held-out poses and state the verdict.
 
-    `held_out`: the held-out measurements; of another campaign, whose frames and targets
-    are then fitted to them. `seed`: of the bootstrap over poses.
+    Parameters
+    ----------
+    diagnosis
+        Result of the training poses.
+    held_out
+        Held-out measurements. If they are of another campaign, its frames and targets
+        are fitted to them.
+    seed
+        Seed of the bootstrap over poses.
     """
-    case = diagnosis.case
-    steps = diagnosis.steps
-    errors, part, outside = remove_gross_errors(diagnosis, held_out)
-    left_out = describe_gross_errors(errors, held_out.campaign, held_out=True)
-    rows, heldout, warnings = compare_held_out_errors(steps, case, part, outside, seed)
-    whole = (
-        [
-            ErrorSummary(**figures.summarize_errors(error.distance))
-            for error in _errors(steps, case, held_out)[1]
-        ]
-        if left_out
-        else []
+    outliers, kept, outside = remove_gross_errors(diagnosis, held_out)
+    rows, heldout, warnings = compare_held_out_errors(
+        diagnosis.steps, diagnosis.case, kept, outside, seed
     )
-    of_all = [error.rms_m for error in whole] or [row["heldout_rms_m"] for row in rows]
-    rows = [
-        row | {"heldout_rms_all_rows_m": rms}
-        for row, rms in zip(rows, of_all, strict=True)
-    ]
-    if left_out:
-        both = BeforeAfter(before=whole[_declared(steps)], after=whole[-1])
-        heldout = replace(heldout, with_gross_errors=both)
-        gross = format_count(len(left_out), "gross error")
-        sizes = [1e3 * each.rms_m for each in (whole[-1], heldout.after)]
-        words = "with all rows the RMS is {:.3g} mm instead of {:.3g} mm".format(*sizes)
-        warnings.append(f"held-out errors are without {gross}: {words}")
-    # By what share each step lowers the held-out RMS.
-    pairs = [(last, row) for last, row in pairwise(rows) if row["kind"] == "effect"]
-    gains = {
-        row["step"].removeprefix("with "): float(
-            1 - row["heldout_rms_m"] / last["heldout_rms_m"]
+    gross_errors = describe_gross_errors(outliers, held_out.campaign, held_out=True)
+    for row in rows:
+        row["heldout_rms_all_rows_m"] = row["heldout_rms_m"]
+    if gross_errors:
+        _, errors = _compute_step_errors(diagnosis.steps, diagnosis.case, held_out)
+        summaries = [_summarize(step_errors) for step_errors in errors]
+        for row, summary in zip(rows, summaries, strict=True):
+            row["heldout_rms_all_rows_m"] = summary.rms_m
+        before = summaries[_find_declared(diagnosis.steps)]
+        heldout = replace(heldout, with_gross_errors=BeforeAfter(before, summaries[-1]))
+        warnings.append(
+            f"held-out errors are without {format_count(len(gross_errors), 'gross error')}:"
+            f" with all rows the RMS is {1e3 * summaries[-1].rms_m:.3g} mm"
+            f" instead of {1e3 * heldout.after.rms_m:.3g} mm"
         )
-        for last, row in pairs
-    }
-    found = diagnosis.verdict
+    delivered = apply_regression(diagnosis, kept, seed)
     remainder = None
-    delivered = apply_regression(diagnosis, part, seed)
     if delivered is not None:
-        draws = open_stream(seed, case.campaign.name, "remainder", 0)
-        facts = summarize_residual_model(
-            delivered, diagnosis.declared, diagnosis.final, case, part, draws
-        )
-        remainder = from_document(Remainder, facts, "regression on the remainder")
+        remainder = _state_remainder(diagnosis, kept, delivered, seed)
         heldout = replace(heldout, delivered=remainder.errors)
-    inherited = {
-        entry.name: getattr(found, entry.name) for entry in fields(TrainingVerdict)
+    training = diagnosis.verdict
+    changes = {
+        "effects": (*training.faults, *_add_gains(training.missing_effects, rows)),
+        "heldout": heldout,
+        "remainder": remainder,
+        "gross_errors": (*training.gross_errors, *gross_errors),
+        "warnings": (
+            *training.warnings,
+            *format_gross_error_warnings(gross_errors),
+            *warnings,
+        ),
     }
-    verdict = Verdict(
-        **inherited
-        | {
-            "effects": tuple(
-                replace(effect, heldout_gain=gains.get(effect.name))
-                if isinstance(effect, Effect)
-                else effect
-                for effect in found.effects
-            ),
-            "heldout": heldout,
-            "remainder": remainder,
-            "gross_errors": (*found.gross_errors, *left_out),
-            "warnings": (
-                *found.warnings,
-                *format_gross_error_warnings(left_out),
-                *warnings,
-            ),
-        }
-    )
     return Judgement(
-        verdict,
+        Verdict(**vars(training) | changes),
         rows,
-        part,
-        held_out.campaign.measurements.select(errors.gross),
+        kept,
+        held_out.campaign.measurements.select(outliers.gross),
         outside,
         delivered,
     )
 
 
+def _add_gains(
+    effects: Sequence[Effect], rows: Sequence[Mapping[str, Any]]
+) -> list[Effect]:
+    """Add the share by which each effect lowers the RMS of the held-out errors, by the
+    rows of before_after.csv; None for an effect without a step of its own."""
+    gains = {
+        row["step"].removeprefix("with "): float(
+            1 - row["heldout_rms_m"] / previous["heldout_rms_m"]
+        )
+        for previous, row in pairwise(rows)
+        if row["kind"] == "effect"
+    }
+    return [replace(effect, heldout_gain=gains.get(effect.name)) for effect in effects]
+
+
+def _state_remainder(
+    diagnosis: Diagnosis, held_out: Case, delivered: CorrectedResiduals, seed: int
+) -> Remainder:
+    """State what a regression on the residual of the final model improves."""
+    case = diagnosis.case
+    stream = open_stream(seed, case.campaign.name, "remainder", 0)
+    facts = summarize_residual_model(
+        delivered, diagnosis.declared, diagnosis.final, case, held_out, stream
+    )
+    return from_document(Remainder, facts, "regression on the remainder")
+
+
 def apply_regression(
     diagnosis: Diagnosis, held_out: Case, seed: int
 ) -> CorrectedResiduals | None:
-    """The final model with the regression that a campaign asks for, on held-out poses
-    without gross errors; None for none."""
+    """Predict held-out poses by the final model and the regression of the campaign.
+
+    Parameters
+    ----------
+    diagnosis
+        Result of the training poses.
+    held_out
+        Held-out poses without gross errors.
+    seed
+        Seed of the cross-validation.
+
+    Returns
+    -------
+    CorrectedResiduals or None
+        None if the campaign asks for no regression, or if its data are at fault.
+    """
     campaign = diagnosis.case.campaign
     if campaign.remainder == NO_REMAINDER or diagnosis.verdict.faults:
         return None
-    # Poses held out at random have neighbours among those fitted; others have none, nor
-    # may those that set the intervals.
-    final = diagnosis.final
-    case = diagnosis.case
-    blocks = "fraction" not in campaign.holdout
+    # Poses that were held out at random have neighbours among the fitted ones. Others
+    # have none, and the poses that set the intervals must not have any either.
     return validate_residual_model(
-        final,
-        case,
+        diagnosis.final,
+        diagnosis.case,
         held_out,
         campaign.remainder,
-        blocks=blocks,
+        blocks="fraction" not in campaign.holdout,
         within_range=True,
         seed=seed,
     )
@@ -202,195 +238,242 @@ def apply_regression(
 def remove_gross_errors(
     diagnosis: Diagnosis, held_out: Case
 ) -> tuple[OutlierTest, Case, np.ndarray]:
-    """Held-out rows that the final model does not explain, by the rule of the training
-    rows; the case without; and which of its poses lie outside the range of the fitted
-    ones, (P,)."""
+    """Leave out the held-out rows that the final model does not explain, by the rule of
+    the training rows.
+
+    Returns
+    -------
+    OutlierTest
+        Outcome of the test of all held-out rows.
+    Case
+        The case without its gross errors.
+    ndarray
+        (P,) of bool, poses of that case outside the range of the fitted ones.
+    """
     final = diagnosis.final
     measurements = held_out.campaign.measurements
-    poses = find_extrapolated_poses(final, diagnosis.case, held_out)
-    part = held_out
-    errors = OutlierTest.none(len(measurements), held_out.model.rows)
+    kept = held_out
+    outside = find_extrapolated_poses(final, diagnosis.case, held_out)
+    outliers = OutlierTest.none(len(measurements), held_out.model.rows)
     if diagnosis.verdict.faults:
-        return errors, part, poses
-    settings = diagnosis.settings
-    noise = parse_noise(diagnosis.document).without_pose_error
+        return outliers, kept, outside
     fitted_uncertainty = estimate_prediction_uncertainty(
-        final, noise, diagnosis.case.campaign.measurements
+        final,
+        parse_noise(diagnosis.document).without_pose_error,
+        diagnosis.case.campaign.measurements,
     )
-    outside = poses[index_poses(measurements)]
-    for _ in range(settings.gross_error_rounds):
-        # Frames of another campaign are fitted to what is kept of it.
-        model, estimate = transfer_fit(final, diagnosis.case, part)
+    is_extrapolated = outside[index_poses(measurements)]
+    for _ in range(diagnosis.settings.gross_error_rounds):
+        # Frames of another campaign are fitted to the rows that are kept.
+        model, estimate = transfer_fit(final, diagnosis.case, kept)
         uncertainty = fitted_uncertainty
         if model is not final.model or estimate is not final.estimate:
-            uncertainty = replace(fitted_uncertainty, parameter_covariance=None)
-        last = errors.gross
-        errors = find_held_out_gross_errors(
-            model, estimate, uncertainty, held_out, outside, settings
+            uncertainty = replace(uncertainty, parameter_covariance=None)
+        previous = outliers.gross
+        outliers = find_held_out_gross_errors(
+            model, estimate, uncertainty, held_out, is_extrapolated, diagnosis.settings
         )
-        part = held_out.select(~errors.gross) if errors.gross.any() else held_out
-        if (errors.gross == last).all():
+        kept = held_out.select(~outliers.gross) if outliers.gross.any() else held_out
+        if (outliers.gross == previous).all():
             break
-    return (
-        errors,
-        part,
-        np.bincount(index_poses(part.campaign.measurements), outside[~errors.gross])
-        > 0,
-    )
+    poses = index_poses(kept.campaign.measurements)
+    return outliers, kept, np.bincount(poses, is_extrapolated[~outliers.gross]) > 0
 
 
 def compare_held_out_errors(
     steps: Sequence[Step], case: Case, held_out: Case, outside: np.ndarray, seed: int
 ) -> tuple[list[dict[str, Any]], HeldOut, list[str]]:
-    """Errors of every step on training and held-out poses.
+    """Compare the errors of all steps on training and held-out poses.
 
-    `held_out`, `seed`: as in `judge`. `outside` (P,): as of `Verdict`. Returns `rows`:
-    of before_after.csv; `heldout`: as in verdict.json.
+    Parameters
+    ----------
+    steps
+        Models from the frames to the final one.
+    case
+        Training poses.
+    held_out
+        Held-out poses without gross errors.
+    outside
+        (P,) of bool, held-out poses outside the range of the fitted ones.
+    seed
+        Seed of the bootstrap over poses.
+
+    Returns
+    -------
+    rows : list of dict
+        Rows of before_after.csv.
+    heldout : HeldOut
+        Errors of the validation poses as they stand in the verdict.
+    warnings : list of str
+        Sentences.
     """
-    there, errors = _errors(steps, case, held_out)
-    before = _declared(steps)
-    after = len(steps) - 1
-    draws = open_stream(seed, case.campaign.name, "held-out poses", 0)
-    limits, reductions = figures.compute_error_intervals(
-        errors, _REPLICATES, draws, before
+    transferred, errors = _compute_step_errors(steps, case, held_out)
+    declared = _find_declared(steps)
+    stream = open_stream(seed, case.campaign.name, "held-out poses", 0)
+    intervals, reductions = compute_error_intervals(
+        errors, _REPLICATES, stream, declared
     )
-    of_calibration = figures.compute_error_intervals(
-        [errors[0], errors[after]], _REPLICATES, draws
-    )[1][1]
-    floor = figures.compute_noise_floor(
-        steps[after].fitted, held_out.observations, *there[after]
+    calibration = compute_error_intervals([errors[0], errors[-1]], _REPLICATES, stream)[
+        1
+    ][1]
+    floor = compute_noise_floor(
+        steps[-1].fitted, held_out.observations, *transferred[-1]
     )
-    rows = []
-    warnings = []
-    for step, error, limit in zip(steps, errors, limits, strict=True):
-        training = figures.summarize_errors(
-            np.linalg.norm(step.fitted.residual[:, :3], axis=1)
-        )
-        tested = figures.summarize_errors(error.distance)
-        row: dict[str, Any] = {
-            "step": step.name,
-            "kind": step.kind,
-            "parameters": int((~step.fitted.unidentifiable).sum()),
-        }
-        row |= {f"train_{name}": training[name] for name in figures.METRICS}
-        for name in figures.METRICS:
-            low, high = limit[name]
-            row |= {
-                f"heldout_{name}": tested[name],
-                f"heldout_{name}_low": low,
-                f"heldout_{name}_high": high,
-            }
-        rows.append(
-            row
-            | {
-                f"heldout_{name.removesuffix('_m')}_over_floor": tested[name] / floor
-                for name in figures.METRICS
-            }
-        )
-    for name in figures.METRICS:
-        low, high = (
-            1e3 * rows[number][f"heldout_{name}"] for number in (before, after)
-        )
-        if high > low:
-            warnings.append(
-                f"the {_ERRORS[name]} {ABOUT_ERRORS} grew from {low:.3f} to {high:.3f} mm"
-            )
-    by_range = figures.summarize_errors_by_range(
-        {"before": errors[before], "after": errors[after]}, outside
+    rows = [
+        _tabulate_step(step, step_errors.distance, limits, floor)
+        for step, step_errors, limits in zip(steps, errors, intervals, strict=True)
+    ]
+    by_range = summarize_errors_by_range(
+        {"before": errors[declared], "after": errors[-1]}, outside
     )
-    summary_after = ErrorSummary(**figures.summarize_errors(errors[after].distance))
+    after = _summarize(errors[-1])
+    states = held_out.observations.states
+    joint_ranges = find_joint_ranges(states, held_out.campaign.robot)
     heldout = HeldOut(
         uncalibrated=UncalibratedErrors(
-            **figures.summarize_errors(errors[0].distance),
-            reduction_ci95=(of_calibration.low, of_calibration.high),
+            **summarize_errors(errors[0].distance),
+            reduction_ci95=(calibration.low, calibration.high),
         ),
-        before=ErrorSummary(**figures.summarize_errors(errors[before].distance)),
-        after=summary_after,
+        before=_summarize(errors[declared]),
+        after=after,
         noise_floor_rms_m=None if np.isnan(floor) else floor,
-        reduction_ci95=(reductions[after].low, reductions[after].high),
-        reduction_std_error=reductions[after].std_error,
+        reduction_ci95=(reductions[-1].low, reductions[-1].high),
+        reduction_std_error=reductions[-1].std_error,
         poses=errors[0].poses,
-        configurations=count_configurations(held_out.observations.states),
-        joint_ranges=tuple(
-            JointRange(**entry)
-            for entry in find_joint_ranges(
-                held_out.observations.states, held_out.campaign.robot
-            )
-        ),
-        share_below_max=figures.bound_share_below_maximum(errors[0].poses),
+        configurations=count_configurations(states),
+        joint_ranges=tuple(JointRange(**limits) for limits in joint_ranges),
+        share_below_max=bound_share_below_maximum(errors[0].poses),
         outside_range=from_document(ErrorsByRange, by_range, "errors by range"),
         with_gross_errors=None,
-        delivered=summary_after,
+        delivered=after,
     )
-    if count := by_range["poses"]:
-        lie = f"{count} of {format_count(len(outside), 'validation pose')} {'lies' if count == 1 else 'lie'}"
-        warnings.append(
-            f"{lie} outside the range of the fitted poses: errors there are extrapolated"
-        )
-    return (
-        rows,
-        heldout,
-        warnings
-        + warn_of_repeated_poses(
-            case.observations.states, held_out.observations.states
-        ),
-    )
+    warnings = [
+        *_warn_of_growth(heldout),
+        *_warn_of_extrapolation(outside),
+        *warn_of_repeated_poses(case.observations.states, states),
+    ]
+    return rows, heldout, warnings
 
 
-def _errors(
-    steps: Sequence[Step], case: Case, held_out: Case
-) -> tuple[list[tuple[Model, Estimate]], list[figures.PositionErrors]]:
-    """Models of all steps, placed where held-out measurements were made, and their
-    errors there."""
-    there = [transfer_fit(step.fitted, case, held_out) for step in steps]
-    return there, [
-        figures.compute_position_errors(model, estimate, held_out.observations)
-        for model, estimate in there
+def _tabulate_step(
+    step: Step, distance: np.ndarray, intervals: Mapping[str, np.ndarray], floor: float
+) -> dict[str, Any]:
+    """Row of before_after.csv of one step, by its held-out errors (M,), their intervals
+    and the RMS error of the noise alone, m."""
+    training = summarize_errors(np.linalg.norm(step.fitted.residual[:, :3], axis=1))
+    held_out = summarize_errors(distance)
+    row: dict[str, Any] = {
+        "step": step.name,
+        "kind": step.kind,
+        "parameters": int((~step.fitted.unidentifiable).sum()),
+    }
+    row |= {f"train_{name}": training[name] for name in METRICS}
+    for name in METRICS:
+        row[f"heldout_{name}"] = held_out[name]
+        row[f"heldout_{name}_low"], row[f"heldout_{name}_high"] = intervals[name]
+    for name in METRICS:
+        row[f"heldout_{name.removesuffix('_m')}_over_floor"] = held_out[name] / floor
+    return row
+
+
+def _warn_of_growth(heldout: HeldOut) -> list[str]:
+    warnings = []
+    for name in METRICS:
+        before_mm = 1e3 * getattr(heldout.before, name)
+        after_mm = 1e3 * getattr(heldout.after, name)
+        if after_mm > before_mm:
+            warnings.append(
+                f"the {_METRIC_NAMES[name]} of the validation poses grew from"
+                f" {before_mm:.3f} to {after_mm:.3f} mm"
+            )
+    return warnings
+
+
+def _warn_of_extrapolation(outside: np.ndarray) -> list[str]:
+    count = int(outside.sum())
+    if not count:
+        return []
+    poses = format_count(len(outside), "validation pose")
+    verb = "lies" if count == 1 else "lie"
+    return [
+        f"{count} of {poses} {verb} outside the range of the fitted poses:"
+        " errors there are extrapolated"
     ]
 
 
-def _declared(steps: Sequence[Step]) -> int:
-    return next(number for number, step in enumerate(steps) if step.kind == "declared")
+def _compute_step_errors(
+    steps: Sequence[Step], case: Case, held_out: Case
+) -> tuple[list[TransferredFit], list[PositionErrors]]:
+    """Models of all steps, transferred to the held-out measurements, and their errors
+    there."""
+    transferred = [transfer_fit(step.fitted, case, held_out) for step in steps]
+    errors = [
+        compute_position_errors(model, estimate, held_out.observations)
+        for model, estimate in transferred
+    ]
+    return transferred, errors
+
+
+def _summarize(errors: PositionErrors) -> ErrorSummary:
+    return ErrorSummary(**summarize_errors(errors.distance))
+
+
+def _find_declared(steps: Sequence[Step]) -> int:
+    return [step.kind for step in steps].index("declared")
 
 
 def generate_residual_blocks(
-    diagnosis: Diagnosis, verdict: Judgement
+    diagnosis: Diagnosis, judgement: Judgement
 ) -> Iterator[dict[str, np.ndarray]]:
-    """Blocks of the residuals table: every measurement before and after, gross errors
-    behind the others."""
-    case = diagnosis.case
-    before = diagnosis.declared
-    after = diagnosis.final
-    for part, left_out, unseen in (
-        (case, diagnosis.left_out, False),
-        (verdict.held_out, verdict.left_out, True),
+    """Generate blocks of the residuals table: every measurement with its residuals
+    before and after, gross errors after the others."""
+    no_poses = np.zeros(diagnosis.case.observations.cluster.max() + 1, bool)
+    for case, outside, left_out, is_held_out in (
+        (diagnosis.case, no_poses, diagnosis.left_out, False),
+        (judgement.held_out, judgement.outside, judgement.left_out, True),
     ):
-        there = [transfer_fit(fitted, case, part) for fitted in (before, after)]
-        outside = (
-            verdict.outside
-            if unseen
-            else np.zeros(part.observations.cluster.max() + 1, bool)
+        stages = {
+            "before": transfer_fit(diagnosis.declared, diagnosis.case, case),
+            "after": transfer_fit(diagnosis.final, diagnosis.case, case),
+        }
+        measurements = case.campaign.measurements
+        yield _tabulate_stages(
+            measurements,
+            outside[index_poses(measurements)],
+            stages,
+            held_out=is_held_out,
+            gross_errors=False,
         )
-        measurements = part.campaign.measurements
-        for some, beyond in (
-            (measurements, outside[index_poses(measurements)]),
-            (left_out, np.zeros(len(left_out), bool)),
-        ):
-            if not len(some):
-                continue
-            observations = separate_measurements(some)
-            off = {
-                stage: compute_residuals(
-                    *each, observations, evaluate_conditions(*each, observations.states)
-                )
-                for stage, each in zip(("before", "after"), there, strict=True)
-            }
-            position = transform_to_base(there[-1][1], observations)[0]
-            yield tabulate_residuals(
-                some,
-                beyond,
-                position,
-                off,
-                held_out=unseen,
-                gross_errors=some is left_out,
+        if len(left_out):
+            yield _tabulate_stages(
+                left_out,
+                np.zeros(len(left_out), bool),
+                stages,
+                held_out=is_held_out,
+                gross_errors=True,
             )
+
+
+def _tabulate_stages(
+    measurements: Measurements,
+    outside: np.ndarray,
+    stages: Mapping[str, TransferredFit],
+    *,
+    held_out: bool,
+    gross_errors: bool,
+) -> dict[str, np.ndarray]:
+    """Columns of the residuals table; arguments as of `tabulate_residuals`, with the
+    model of each stage."""
+    observations = separate_measurements(measurements)
+    residuals = {}
+    for stage, (model, estimate) in stages.items():
+        conditions = evaluate_conditions(model, estimate, observations.states)
+        residuals[stage] = compute_residuals(model, estimate, observations, conditions)
+    return tabulate_residuals(
+        measurements,
+        outside,
+        transform_to_base(stages["after"][1], observations)[0],
+        residuals,
+        held_out=held_out,
+        gross_errors=gross_errors,
+    )

@@ -365,7 +365,7 @@ def propose_experiment(
     planned = build_planned_observations(model, states, angles, wrench)
     pairs, rows = _predict_experiments(evidence, hypotheses, planned)
     plan = _Plan.choose(hypotheses, pairs, rows, poses)
-    if plan.unreachable and plan.certainty >= evidence.linearized.settings.credible:
+    if plan.unreachable and plan.certainty >= evidence.design.settings.credible:
         return _explain_no_experiment(
             robot, best, NOT_DISTINGUISHABLE, plan.unreachable
         )
@@ -453,7 +453,7 @@ def _predict_experiments(
 ) -> tuple[list[HypothesisPair], np.ndarray]:
     """Pairs of the best hypothesis with each alternative, and the rows (E, R, U) of
     planned experiments in units of the noise that the best one leaves."""
-    design = evidence.linearized
+    design = evidence.design
     models = [evidence.posterior.models[h.model] for h in hypotheses]
     misfit = predict_reduced_chi_square(design.problem, models[0])
     noise_factor = float(np.sqrt(max(misfit, 1.0)))
@@ -537,7 +537,7 @@ def _select_hypotheses(evidence: Evidence) -> list[Hypothesis]:
     conclusion = evidence.conclusion
     present = [h for h in conclusion.hypotheses if h.mechanisms and h.model >= 0]
     cumulative = np.cumsum([h.probability for h in present])
-    least = evidence.linearized.settings.credible * cumulative[-1]
+    least = evidence.design.settings.credible * cumulative[-1]
     credible = present[: int(np.searchsorted(cumulative, least)) + 1]
     best = conclusion.best
     return [best, *(h for h in credible if h != best)][:_HYPOTHESES]

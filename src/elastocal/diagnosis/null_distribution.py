@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from elastocal.diagnosis.statistics import get_elimination
 from elastocal.fitting.observations import batch_groups_by_size
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ def simulate_null_statistics(
             common = tau * errors[:, -axes:].reshape(noise.shape)
             equations.add_common_error(block, noise, common)
         equations.subtract_correction(block, noise)
-    return equations.eliminate_declared()
+    return equations.eliminate_declared(products)
 
 
 class _SimulatedEquations:
@@ -60,7 +61,6 @@ class _SimulatedEquations:
     sizes : (T,), sizes of the pose error
     score : (P + K, N), products of all columns with the data, without a pose error
     residual_squares : (N,)
-    declared_rows : (T, P, P + K), rows of the declared parameters
     score_corrections, square_corrections : (T, P + K, N), (T, N), to be subtracted for
         each size of the pose error
     """
@@ -71,9 +71,6 @@ class _SimulatedEquations:
         self.sizes = sizes
         self.score = _project_on_columns(products, white)
         self.residual_squares = (white**2).sum(axis=(0, 1))
-        self.declared_rows = np.tile(
-            products.gram[: products.declared_count, :-1], (len(sizes), 1, 1)
-        )
         self.score_corrections = np.zeros((len(sizes), *self.score.shape))
         self.square_corrections = np.zeros((len(sizes), white.shape[2]))
 
@@ -91,7 +88,6 @@ class _SimulatedEquations:
     def subtract_correction(self, block: PoseBlock, noise: np.ndarray) -> None:
         """Subtract the correction for the pose error of some poses, whose axes have the
         products `noise` (G a, N) with the data."""
-        declared = self.declared_rows.shape[1]
         columns = _columns_by_axis(block)
         eigenvalues = block.eigenvalues.reshape(-1, 1)
         for number in np.flatnonzero(self.sizes).tolist():
@@ -100,20 +96,23 @@ class _SimulatedEquations:
             solved = share * noise
             self.score_corrections[number] += columns.T @ solved
             self.square_corrections[number] += (noise * solved).sum(axis=0)
-            self.declared_rows[number] -= columns[:, :declared].T @ (share * columns)
 
-    def eliminate_declared(self) -> tuple[np.ndarray, np.ndarray]:
+    def eliminate_declared(
+        self, products: CrossProducts
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Marginalise the declared parameters: score (T, K, N), squares (T, N)."""
-        declared = self.declared_rows.shape[1]
+        declared = products.declared_count
         sizes, columns, count = self.score_corrections.shape
         score = np.empty((sizes, columns - declared, count))
         squares = self.residual_squares - self.square_corrections
-        for number, rows in enumerate(self.declared_rows):
+        for number, size in enumerate(self.sizes.tolist()):
             corrected = self.score - self.score_corrections[number]
-            factor = np.linalg.cholesky(rows[:, :declared])
-            fitted = solve_triangular(factor, corrected[:declared], lower=True)
-            cross = solve_triangular(factor, rows[:, declared:], lower=True)
-            np.subtract(corrected[declared:], cross.T @ fitted, out=score[number])
+            elimination = get_elimination(products, size)
+            fitted = solve_triangular(
+                elimination.factor, corrected[:declared], lower=True
+            )
+            coupling = elimination.coupling[:, :-1]
+            np.subtract(corrected[declared:], coupling.T @ fitted, out=score[number])
             squares[number] -= (fitted**2).sum(axis=0)
         return score, squares
 

@@ -115,22 +115,6 @@ class Elimination:
     low_rank: np.ndarray
 
 
-class EliminationCache:
-    """Cache of eliminations by the size of the pose error, so that normal equations at
-    a size that was met need no second pass over the poses, nor the rows themselves."""
-
-    def __init__(self) -> None:
-        self._by_pose_error: dict[float, Elimination] = {}
-
-    def store(self, pose_error_rad: float, elimination: Elimination) -> None:
-        """Keep the elimination at one size of the pose error."""
-        self._by_pose_error[pose_error_rad] = elimination
-
-    def get(self, pose_error_rad: float) -> Elimination | None:
-        """Return the elimination at one size of the pose error, None if not met."""
-        return self._by_pose_error.get(pose_error_rad)
-
-
 @dataclass(frozen=True)
 class CrossProducts:
     """Products of all columns, from which statistics follow at any size of the pose
@@ -147,7 +131,9 @@ class CrossProducts:
     basis_transform : (P, P), turns declared columns into orthonormal ones
     projections : (P, K + 1), coordinates of the other columns in the orthonormal ones
     spanned : (K,) bool, candidate columns of which the declared ones leave nothing
-    eliminations : cache that `compute_statistics` and `assemble_normal_equations` share
+    elimination_cache : eliminations by the size of the pose error, so that normal
+        equations at a size that was met need no second pass over the poses, nor the
+        rows themselves; `compute_statistics` fills it
     """
 
     rows: WhitenedRows
@@ -158,8 +144,8 @@ class CrossProducts:
     basis_transform: np.ndarray
     projections: np.ndarray
     spanned: np.ndarray
-    eliminations: EliminationCache = field(
-        default_factory=EliminationCache, repr=False, compare=False
+    elimination_cache: dict[float, Elimination] = field(
+        default_factory=dict, repr=False, compare=False
     )
 
     @property
@@ -175,7 +161,7 @@ class CrossProducts:
             gram=self.gram[np.ix_(kept, kept)],
             projections=self.projections[:, -1:],
             spanned=self.spanned[:0],
-            eliminations=EliminationCache(),
+            elimination_cache={},
         )
 
     @property
@@ -464,7 +450,7 @@ def compute_statistics(
             equations.subtract_correction(block)
     eliminations = equations.eliminate_declared()
     for tau, elimination in zip(sizes, eliminations, strict=True):
-        products.eliminations.store(float(tau), elimination)
+        products.elimination_cache[float(tau)] = elimination
     factors = np.array([elimination.factor for elimination in eliminations])
     log_factors = np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
     gram = equations.gram
@@ -481,16 +467,20 @@ def compute_statistics(
     )
 
 
+def get_elimination(products: CrossProducts, tau: float) -> Elimination:
+    """Return the elimination of the declared parameters at one size of the pose error,
+    from the cache if that size was met."""
+    if tau not in products.elimination_cache:
+        compute_statistics(products, np.array([tau]))
+    return products.elimination_cache[tau]
+
+
 def assemble_normal_equations(
     products: CrossProducts, tau: float, columns: np.ndarray
 ) -> np.ndarray:
     """Assemble Z'Sigma(tau)^-1 Z of the declared columns, some candidate columns (D,)
     and the residual, (P + D + 1, P + D + 1)."""
-    elimination = products.eliminations.get(tau)
-    if elimination is None:
-        compute_statistics(products, np.array([tau]))
-        elimination = products.eliminations.get(tau)
-        assert elimination is not None
+    elimination = get_elimination(products, tau)
     chosen = np.append(columns, -1)
     factor = elimination.factor
     coupling = elimination.coupling[:, chosen]

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import gammaincinv
 
-from elastocal.effects.conditions import at_states
+from elastocal.effects.conditions import select_conditions
 from elastocal.fitting.linearization import linearize, linearize_coordinates
 from elastocal.fitting.model import (
     compute_residuals,
@@ -348,7 +348,7 @@ def _conditions_at(
         return evaluate_conditions(model, estimate, part.states)
     if len(part.states) == len(shared.joint_angles):
         return shared
-    return at_states(shared, states)
+    return select_conditions(shared, states)
 
 
 def estimate_prediction_uncertainty(

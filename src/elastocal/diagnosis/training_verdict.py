@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,7 +32,6 @@ from elastocal.fitting.model import get_joint_compliances
 from elastocal.verdict import (
     Compliances,
     Convergence,
-    DataFault,
     Effect,
     MechanismSet,
     Misfit,
@@ -48,7 +47,7 @@ if TYPE_CHECKING:
     from elastocal.data_checks.protocol import Fault
     from elastocal.diagnosis.diagnose import Step
     from elastocal.diagnosis.settings import Settings
-    from elastocal.diagnosis.verdict import Evidence, Hypothesis
+    from elastocal.diagnosis.verdict import Evidence
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case
     from elastocal.fitting.noise import Noise
@@ -99,18 +98,8 @@ def state_training_verdict(
     result: TrainingResult, settings: Settings
 ) -> TrainingVerdict:
     """State the part of a verdict that the training poses decide."""
-    statement = _state_faults(result.faults)
-    if result.evidence:
-        statement = _state_evidence(result, result.evidence, settings)
     declared = result.steps[1].fitted
     final = result.steps[-1].fitted
-    warnings = [
-        *result.warnings,
-        *statement.warnings,
-        *warn_of_compliances(final),
-        *warn_of_scatter(final.noise, result.noise, settings.relinearize_noise),
-        *_warn_of_convergence(declared, final),
-    ]
     held = {
         f"{owner} {parameter.name}"
         for (owner, parameter), is_held in zip(
@@ -118,27 +107,24 @@ def state_training_verdict(
         )
         if is_held
     }
-    return TrainingVerdict(
-        verdict=statement.verdict,
-        effects=statement.effects,
-        probabilities=statement.probabilities,
-        misfit=statement.misfit,
-        other_models_m=statement.other_models_m,
+    stated = TrainingVerdict(
+        verdict=NAMED if len(result.faults) == 1 else SEVERAL,
+        effects=tuple(state_fault(fault) for fault in result.faults),
+        probabilities=None,
+        misfit=None,
+        other_models_m=None,
         campaign=result.case.campaign.name,
         noise=_state_noise(result.noise, final.noise),
         heldout=None,
         kept=result.steps[-1].kind.replace("kept", "frames"),
         compliance_urad_per_Nm=_state_compliances(
-            declared, final, statement.compliance_average, settings.prior_share
+            declared, final, ModelAverage({}, {}), settings.prior_share
         ),
         held=tuple(sorted(held)),
-        candidates_tested=statement.candidates_tested,
-        untestable=statement.untestable,
+        candidates_tested=0,
+        untestable={},
         converged=Convergence(declared.converged, final.converged),
-        warnings=(
-            *dict.fromkeys(warnings),
-            *format_gross_error_warnings(list(result.gross_errors)),
-        ),
+        warnings=(),
         settings={
             name: Setting(**entry) for name, entry in settings.document().items()
         },
@@ -146,47 +132,45 @@ def state_training_verdict(
         gross_errors=result.gross_errors,
         repeatable=result.repeatable,
     )
-
-
-@dataclass(frozen=True)
-class _Statement:
-    """Result of the search, or faults of the data, as verdict.json has them.
-
-    `compliance_average` corrects the compliances of the final model by those of other
-    probable models; `warnings` concern the search alone.
-    """
-
-    verdict: str
-    effects: tuple[Effect | DataFault, ...]
-    probabilities: Probabilities | None = None
-    misfit: Misfit | None = None
-    other_models_m: float | None = None
-    candidates_tested: int = 0
-    untestable: dict[str, str] = field(default_factory=dict)
-    compliance_average: ModelAverage = field(
-        default_factory=lambda: ModelAverage({}, {})
+    if result.evidence:
+        stated = _state_evidence(stated, result, result.evidence, settings)
+    warnings = [
+        *result.warnings,
+        *stated.warnings,
+        *warn_of_compliances(final),
+        *warn_of_scatter(final.noise, result.noise, settings.relinearize_noise),
+    ]
+    for name, fitted in (("declared", declared), ("final", final)):
+        if not fitted.converged:
+            warnings.append(
+                f"the fit of the {name} model did not converge:"
+                " its parameters are not to be relied on"
+            )
+    return replace(
+        stated,
+        warnings=(
+            *dict.fromkeys(warnings),
+            *format_gross_error_warnings(list(result.gross_errors)),
+        ),
     )
-    warnings: tuple[str, ...] = ()
-
-
-def _state_faults(faults: Sequence[Fault]) -> _Statement:
-    verdict = NAMED if len(faults) == 1 else SEVERAL
-    return _Statement(verdict, tuple(state_fault(fault) for fault in faults))
 
 
 def _state_evidence(
-    result: TrainingResult, evidence: Evidence, settings: Settings
-) -> _Statement:
-    """State the result of the search."""
-    design = evidence.linearized
+    stated: TrainingVerdict,
+    result: TrainingResult,
+    evidence: Evidence,
+    settings: Settings,
+) -> TrainingVerdict:
+    """State the result of the search, with warnings that concern the search alone."""
+    design = evidence.design
     posterior = evidence.posterior
     best = evidence.conclusion.best
     declared = result.steps[1].fitted
-    best_model = posterior.empty_model
-    if best.mechanisms:
-        best_model = posterior.models[best.model]
+    best_model = (
+        posterior.models[best.model] if best.mechanisms else posterior.empty_model
+    )
     # The competitor alone predicts nothing that could be kept.
-    named_model = best_model if best.named else posterior.empty_model
+    named_model = evidence.named_model
     kept_model = named_model if evidence.adopted else posterior.empty_model
     owners = [(owner, parameter.name) for owner, parameter in declared.parameters]
     average = average_models(design, posterior, named_model, owners)
@@ -199,8 +183,12 @@ def _state_evidence(
     between_models = compute_between_model_squares(
         design.problem, posterior, kept_model
     )
+    other_models = float(
+        np.sqrt(3.0 * between_models / design.products.degrees_of_freedom)
+    )
     tested = {term.candidate.key for term in design.problem.terms if term.candidate}
-    return _Statement(
+    return replace(
+        stated,
         verdict=evidence.conclusion.verdict,
         effects=effects,
         probabilities=_state_probabilities(evidence),
@@ -208,13 +196,12 @@ def _state_evidence(
             refit.predict_reduced_chi_square(design.problem, posterior.empty_model),
             refit.predict_reduced_chi_square(design.problem, best_model),
         ),
-        other_models_m=float(
-            np.sqrt(3.0 * between_models / design.products.degrees_of_freedom)
-        )
-        * result.noise.position_m,
+        other_models_m=other_models * result.noise.position_m,
+        compliance_urad_per_Nm=_state_compliances(
+            declared, result.steps[-1].fitted, kept_average, settings.prior_share
+        ),
         candidates_tested=len(tested),
         untestable=design.untestable,
-        compliance_average=kept_average,
         warnings=_warn_of_search(evidence, result.full_model, effects, settings),
     )
 
@@ -243,38 +230,29 @@ def _warn_of_search(
     return tuple(warnings)
 
 
-def _warn_of_convergence(declared: Fit, final: Fit) -> list[str]:
-    return [
-        f"the fit of the {name} model did not converge: its parameters are not to be relied on"
-        for name, fitted in (("declared", declared), ("final", final))
-        if not fitted.converged
-    ]
-
-
 def _state_probabilities(evidence: Evidence) -> Probabilities:
     """State the probabilities that are worth reporting; each set of mechanisms has the
     locations of its most probable model."""
     conclusion = evidence.conclusion
     sets = []
+    nothing = 0.0
     for hypothesis in conclusion.hypotheses:
+        if not hypothesis.mechanisms:
+            nothing = hypothesis.probability
         if hypothesis.probability < MIN_REPORTED_PROBABILITY:
             continue
-        sets.append(
-            MechanismSet(
-                hypothesis.mechanisms,
-                hypothesis.probability,
-                {
-                    name: _list_location_words(evidence, hypothesis, name)
-                    for name in hypothesis.mechanisms
-                },
+        model = evidence.posterior.models[hypothesis.model]
+        locations = {}
+        for name in hypothesis.mechanisms:
+            model_locations = list_locations(evidence.design.problem, model, name)
+            locations[name] = tuple(
+                format_location(name, location) for location in model_locations
             )
+        sets.append(
+            MechanismSet(hypothesis.mechanisms, hypothesis.probability, locations)
         )
     return Probabilities(
-        nothing=next(
-            hypothesis.probability
-            for hypothesis in conclusion.hypotheses
-            if not hypothesis.mechanisms
-        ),
+        nothing=nothing,
         stated=conclusion.probability,
         alarm_p_value=evidence.alarm.p_value,
         mechanisms={
@@ -284,14 +262,6 @@ def _state_probabilities(evidence: Evidence) -> Probabilities:
         },
         sets=tuple(sets),
     )
-
-
-def _list_location_words(
-    evidence: Evidence, hypothesis: Hypothesis, mechanism: str
-) -> tuple[str, ...]:
-    model = evidence.posterior.models[hypothesis.model]
-    locations = list_locations(evidence.linearized.problem, model, mechanism)
-    return tuple(format_location(mechanism, location) for location in locations)
 
 
 def _state_noise(measured: Noise, final: Noise) -> NoiseEstimate:

@@ -111,7 +111,7 @@ class Evidence:
 
     Attributes
     ----------
-    linearized : CandidateDesign
+    design : CandidateDesign
         The linearised problem.
     posterior : Posterior
         Models with their probabilities.
@@ -119,25 +119,34 @@ class Evidence:
         Test of whether anything is missing.
     conclusion : Conclusion
         The verdict.
+    fitted : Fit
+        The model found, fitted to the observations of the search.
     adopted : bool
         Whether the effects found enter the model.
     settled : bool
         Whether a further linearisation would lead to the same model.
-    fitted : Fit
-        The model found, fitted to the observations of the search.
-    tested : tuple or None
+    tested : tuple
         The last fit whose residuals were tested for a function of the joints, and the
-        result of that test.
+        result of that test; both None if there was no test.
     """
 
-    linearized: CandidateDesign
+    design: CandidateDesign
     posterior: Posterior
     alarm: Alarm
     conclusion: Conclusion
-    adopted: bool
-    settled: bool
     fitted: Fit
-    tested: tuple[Fit, RepeatableResidual | None] | None
+    adopted: bool = False
+    settled: bool = False
+    tested: tuple[Fit | None, RepeatableResidual | None] = (None, None)
+
+    @property
+    def named_model(self) -> ScoredModel:
+        """Most probable model of the best hypothesis; the declared model alone if the
+        hypothesis names no mechanism of the catalogue."""
+        best = self.conclusion.best
+        if best.named:
+            return self.posterior.models[best.model]
+        return self.posterior.empty_model
 
 
 def conclude(problem: SearchProblem, posterior: Posterior, alarm: Alarm) -> Conclusion:
@@ -189,8 +198,9 @@ def _choose_verdict(
     nothing = next(h for h in hypotheses if not h.mechanisms)
     missing = [hypothesis for hypothesis in hypotheses if hypothesis.mechanisms]
     by_verdict: dict[str, list[Hypothesis]] = {UNEXPLAINED: [], CLASS: [], SEVERAL: []}
+    by_count = list(by_verdict)
     for hypothesis in missing:
-        by_verdict[_classify(hypothesis)].append(hypothesis)
+        by_verdict[by_count[min(len(hypothesis.named), 2)]].append(hypothesis)
     verdict = max(by_verdict, key=lambda name: _sum_probabilities(by_verdict[name]))
     best = next(iter(by_verdict[verdict]), nothing)
     competitors = [hypothesis for hypothesis in missing if hypothesis != best]
@@ -204,7 +214,8 @@ def _choose_verdict(
             probability += nothing.probability
     elif state_alone and verdict == CLASS and OTHER not in best.mechanisms:
         verdict = NAMED
-        probability = best.probability
+        # Rounding may carry the sum of the models beyond one.
+        probability = min(best.probability, 1.0)
         alternatives = dict.fromkeys(best.named, ())
     else:
         probability = min(_sum_probabilities(stated), 1.0)
@@ -226,13 +237,6 @@ def _compute_inclusion_probabilities(
     return dict(sorted(probabilities.items(), key=lambda entry: -entry[1]))
 
 
-def _classify(hypothesis: Hypothesis) -> str:
-    """Return the verdict that the number of mechanisms of a hypothesis leads to."""
-    if not hypothesis.named:
-        return UNEXPLAINED
-    return CLASS if len(hypothesis.named) == 1 else SEVERAL
-
-
 def _sum_probabilities(hypotheses: Sequence[Hypothesis]) -> float:
     return sum(hypothesis.probability for hypothesis in hypotheses)
 
@@ -252,8 +256,10 @@ def allow_related_mechanisms(
         Mechanisms whose size is not plausible.
     """
     alternatives = {
-        name: (*others, OTHER) if name in doubted and OTHER not in others else others
-        for name, others in conclusion.alternatives.items()
+        name: tuple(dict.fromkeys((*alternative, OTHER)))
+        if name in doubted
+        else alternative
+        for name, alternative in conclusion.alternatives.items()
     }
     verdict = conclusion.verdict
     if verdict == NAMED and doubted:

@@ -221,7 +221,9 @@ class Conditions:
         ).T
 
 
-def progress_of(states: States, row_span: tuple[int, int] | None = None) -> np.ndarray:
+def compute_progress(
+    states: States, row_span: tuple[int, int] | None = None
+) -> np.ndarray:
     """How far a campaign had come in each state, ndarray (S,): 0 at its first row, 1 at
     its last.
 
@@ -236,7 +238,7 @@ def progress_of(states: States, row_span: tuple[int, int] | None = None) -> np.n
     return (place - first) / max(last - first, 1)
 
 
-def conditions_of(
+def build_conditions(
     sites: Sites,
     compliance: np.ndarray,
     states: States,
@@ -267,11 +269,11 @@ def conditions_of(
         unknown if states.approach is None else states.approach,
         unknown[:, 0] if states.time_s is None else states.time_s - time_zero_s,
         unknown[:, 0] if states.temperature_c is None else states.temperature_c,
-        progress_of(states, row_span),
+        compute_progress(states, row_span),
     )
 
 
-def at_states(conditions: Conditions, chosen: slice | np.ndarray) -> Conditions:
+def select_conditions(conditions: Conditions, chosen: slice | np.ndarray) -> Conditions:
     """Some of the states; `chosen` (S,) of bool."""
     moved = conditions.motion
     some = replace(
@@ -293,7 +295,7 @@ def at_states(conditions: Conditions, chosen: slice | np.ndarray) -> Conditions:
     return replace(conditions, motion=some, of_angles={}, **kept)
 
 
-def with_springs(
+def replace_springs(
     conditions: Conditions, compliance: np.ndarray, mass_corrections: np.ndarray
 ) -> Conditions:
     """The same states with other joint compliances (n,) and other errors of the
@@ -312,7 +314,7 @@ def with_springs(
     return changed
 
 
-def with_total(conditions: Conditions, total: np.ndarray) -> Conditions:
+def replace_total_load(conditions: Conditions, total: np.ndarray) -> Conditions:
     """The same states under another `Conditions.total` load, ndarray (S, C), whatever
     makes it."""
     changed = replace(conditions)
@@ -320,7 +322,7 @@ def with_total(conditions: Conditions, total: np.ndarray) -> Conditions:
     return changed
 
 
-def offered(sites: Sites, states: States) -> frozenset[str]:
+def find_offered_needs(sites: Sites, states: States) -> frozenset[str]:
     """List which needs of effects the data meet.
 
     Returns

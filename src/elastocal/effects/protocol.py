@@ -161,7 +161,7 @@ class Candidate:
         dictionary from a coordinate of the sites to its displacement per unit, ndarray
         (S,). It may depend on the total loads of the coordinates that it displaces, of
         no others.
-    needs : what the data must have, see `conditions.offered`.
+    needs : what the data must have, see `conditions.find_offered_needs`.
     shapes : unknowns in which the displacement is not linear.
     distinct_angles : how many different angles of its joints the law needs to be
         distinguishable from a smooth one.

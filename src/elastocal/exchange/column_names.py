@@ -352,11 +352,11 @@ def _recognize_headers(
         if is_quaternion and _simplify(header) == "q0":
             name = "qw"
             unit = None
-        unit = _choose_unit(text, header, unit)
+        unit = choose_unit(text, header, unit)
         yield _Header(header, names_of_options.get(header, name), unit)
 
 
-def _choose_unit(text: TextTable, header: str, unit: str | None) -> str | None:
+def choose_unit(text: TextTable, header: str, unit: str | None) -> str | None:
     """Unit of a header, or of the row under it; refuse two different ones."""
     unit_below = text.units.get(header)
     if unit and unit_below and unit != unit_below:

@@ -1,35 +1,37 @@
-"""A Denavit-Hartenberg table, checked cell by cell, to the contents of a robot file.
+"""A Denavit-Hartenberg table, checked cell by cell, as the contents of a robot file.
 
-One row for each joint, all of which turn::
+The table has one row for each joint, and all joints are revolute::
 
     joint, theta_offset_deg, d_m,    a_m,     alpha_deg
     1,     0,                0.1625, 0,       90
     2,     0,                0,      -0.425,  0
 
-begins a UR5e in the standard notation. A column of angles or lengths ends in its unit,
-has ``[mm]`` behind its name or a row of units under the header; without, an option says
-which. ``joint`` and a ``type`` of R may be left out.
+begins a UR5e in the standard notation. The unit of a column ends its name, is in brackets
+behind it (``[mm]``), or is in a row of units under the header; otherwise an option must
+state it. ``joint`` and a ``type`` of R may be omitted.
 
-A row of the standard notation [1] is ``Rz(theta) Tz(d) Tx(a) Rx(alpha)``, one of
-Craig's modified notation [2] ``Rx(alpha) Tx(a) Rz(theta) Tz(d)`` with the alpha and a
-of its own row, which he calls alpha and a of i - 1. Along its own axis a joint frame
-may be anywhere. Where two axes are nearly parallel, a calibrated table has lengths d of
-hundreds of metres that cancel [3]; the frames of a chain need not be there.
+A row of the standard notation [1] is ``Rz(theta) Tz(d) Tx(a) Rx(alpha)``. A row of Craig's
+modified notation [2] is ``Rx(alpha) Tx(a) Rz(theta) Tz(d)``, with the alpha and a of its
+own row, which Craig calls alpha and a of i - 1. The frame of a joint may lie anywhere along
+its axis. If two axes are nearly parallel, a calibrated table has lengths d of hundreds of
+metres that cancel [3]; the chain has shorter lengths.
 
-The ROS drivers of Universal Robots write a calibrated arm as ``kinematics`` instead:
-before each joint, which turns about z, a fixed transform ``{x, y, z, roll, pitch,
-yaw}`` (m, rad), as ``origin`` of a URDF, from the controller's base frame on.
+The ROS drivers of Universal Robots write a calibrated arm as ``kinematics`` instead: before
+each joint, which turns about z, a fixed transform ``{x, y, z, roll, pitch, yaw}`` (m, rad),
+as the ``origin`` of a URDF, from the base frame of the controller.
 
-[1] Denavit, J. and Hartenberg, R. S., A kinematic notation for lower-pair mechanisms based on matrices, Journal of Applied
-    Mechanics 22, 1955.
+[1] Denavit, J. and Hartenberg, R. S., A kinematic notation for lower-pair mechanisms based
+    on matrices, Journal of Applied Mechanics 22, 1955.
 [2] Craig, J. J., Introduction to Robotics: Mechanics and Control, Addison-Wesley, 1986.
-[3] Hayati, S., Robot arm geometric link parameter estimation, 22nd IEEE Conference on Decision and Control, 1983.
+[3] Hayati, S., Robot arm geometric link parameter estimation, 22nd IEEE Conference on
+    Decision and Control, 1983.
 """
 
 import math
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -38,34 +40,45 @@ import numpy as np
 from elastocal.campaigns.tables import Cells, Dialect, TextTable, read_text_table
 from elastocal.counting import format_count
 from elastocal.errors import InputError, suggest_names
-from elastocal.exchange.column_names import ANGLE, LENGTH, UNITS, read_units, split_unit
+from elastocal.exchange.column_names import (
+    ANGLE,
+    LENGTH,
+    UNITS,
+    choose_unit,
+    read_units,
+    split_unit,
+)
 from elastocal.exchange.robot_text import (
-    MOST_TURNS,
-    Imported,
+    LARGEST_TURNS,
+    ImportedRobot,
     check_imported,
-    displacement_words,
-    elementary,
-    origin_transform,
-    point_name,
-    word,
+    format_displacement,
+    format_point_name,
+    format_words,
+    make_elementary_transform,
+    make_origin_transform,
 )
 from elastocal.io.documents import read_document
 from elastocal.io.texts import NUMBER_ALLOWED, parse_number
 
 _KINDS = {"theta_offset": ANGLE, "d": LENGTH, "a": LENGTH, "alpha": ANGLE}
 _NEEDED = ("d", "a", "alpha")
-_WORDS = ("joint", "type")
+_WITHOUT_UNIT = ("joint", "type")
 _USUAL = ("joint", "theta_offset_deg", "d_m", "a_m", "alpha_deg", "type")
-# The chain of more has no room in a robot file.
+# Upper bound on the rows of a table; the chain of more does not fit into a robot file.
 _MOST_ROWS = 500
-# Calibrated tables have lengths along nearly parallel axes, by hundreds of metres, that
-# cancel.
+# Upper bound on the turns of an angle in radians. A larger one, such as 90, is in degrees.
+_LARGEST_TURNS_OF_RADIANS = 2
+# Joint frames are moved along their axes if this makes the sum of all lengths smaller than
+# this share: nearly parallel axes of calibrated tables have lengths of hundreds of metres
+# that cancel.
 _MUCH_SHORTER = 0.5
 _SHIFT = re.compile(r"T[xyz]\((-?[0-9.]+)\)", re.ASCII)
-# Of a kinematics file: keys of a transform, and links of Universal Robots with the
-# joints before them; of other robots both have the name that the file has.
 _KINEMATICS = "kinematics"
+# Keys of a transform in a kinematics file.
 _KEYS = ("x", "y", "z", "roll", "pitch", "yaw")
+# Joints before the links of Universal Robots, by the name of the link. In the files of
+# other robots, joints and links have one name.
 _JOINTS = {
     "shoulder": "shoulder_pan_joint",
     "upper_arm": "shoulder_lift_joint",
@@ -80,8 +93,14 @@ _LACKS = [
 
 @dataclass(frozen=True)
 class DhOptions:
-    """Units of columns that do not say, the decimal mark where it is not to be found
-    out, and columns to leave out."""
+    """How a table is read.
+
+    Attributes
+    ----------
+    angles, lengths : units of columns that state none.
+    decimal : decimal mark, if it cannot be recognized.
+    ignore : headers of columns that are left out.
+    """
 
     angles: str | None = None
     lengths: str | None = None
@@ -92,20 +111,47 @@ class DhOptions:
 _AS_STATED = DhOptions()
 
 
+@dataclass(frozen=True)
+class _DhTable:
+    """A checked table.
+
+    Attributes
+    ----------
+    joint_names : names of the joints, empty if the table has none.
+    rows : theta, d, a and alpha of each joint, (n, 4), rad and m.
+    notes : how the columns were understood.
+    """
+
+    joint_names: list[str]
+    rows: np.ndarray
+    notes: list[str]
+
+
 def robot_from_dh(
     path: str | Path,
-    modified: bool = False,
     options: DhOptions = _AS_STATED,
+    *,
+    modified: bool = False,
     name: str | None = None,
-) -> Imported:
-    """The robot of a Denavit-Hartenberg table, or of a YAML file with the kinematics of
-    a ROS driver.
+) -> ImportedRobot:
+    """Import the robot of a Denavit-Hartenberg table, or of the kinematics file of a ROS
+    driver.
 
-    `modified`: Craig's notation; else the standard one. `name`: of the robot; that of
-    the file without. An `InputError` names file, line and column of what cannot be
-    read, or a column whose unit nothing states.
+    Parameters
+    ----------
+    path : the table, .csv, or the kinematics file, .yaml
+    options : how the table is read
+    modified : whether the table has Craig's modified notation
+    name : name of the robot, by default that of the file
+
+    Raises
+    ------
+    InputError
+        Something cannot be read: the error has its file, line and column. Or nothing
+        states the unit of a column.
     """
     source = Path(path).as_posix()
+    name = name or Path(path).stem
     if Path(path).suffix.lower() in (".yaml", ".yml"):
         for option, is_given in (
             ("--modified", modified),
@@ -116,49 +162,36 @@ def robot_from_dh(
                 raise InputError(option, "", found, f"the file without {option}")
         return _robot_from_kinematics(path, name)
     table = _read_table(path, options)
-    document: dict[str, Any] = {"name": name or Path(path).stem}
+    document: dict[str, Any] = {"name": name}
     names = table.joint_names
-    # Numbers alone only count the joints.
-    if any(names) and not all(joint_name.isdecimal() for joint_name in names):
+    # Numbers only count the joints; they do not name them.
+    if not all(joint_name.isdecimal() for joint_name in names) and any(names):
         for joint_name in names:
             if not joint_name or names.count(joint_name) > 1:
                 allowed = "a name for every joint, each once"
                 raise InputError(source, "column joint", repr(joint_name), allowed)
         document["joint_names"] = names
-    words = _words(table.rows, modified)
-    shortest_words = _slid_words(table.rows, modified)
-    length = _total_shift(words)
-    shortest_length = _total_shift(shortest_words)
+    words = _format_rows(table.rows, modified=modified)
+    short_words = _format_short_chain(table.rows, modified=modified)
+    length = _sum_lengths(words)
+    short_length = _sum_lengths(short_words)
     notes = [*table.notes, *_LACKS]
-    if shortest_length < _MUCH_SHORTER * length:
-        words = shortest_words
+    if short_length < _MUCH_SHORTER * length:
+        words = short_words
         notes.append(
             f"lengths of {length:.4g} m that cancel along nearly parallel axes became"
-            f" {shortest_length:.4g} m in the chain, whose joints are at other places of"
+            f" {short_length:.4g} m in the chain, whose joints are at other places of"
             " the same axes: the pose at the end is the same"
         )
     document["chain"] = " ".join([*words, "[flange]"])
-    return check_imported(
-        document,
-        path,
-        f"{'modified' if modified else 'standard'} Denavit-Hartenberg parameters",
-        notes,
-    )
+    notation = "modified" if modified else "standard"
+    description = f"{notation} Denavit-Hartenberg parameters"
+    return check_imported(document, path, description, notes)
 
 
-@dataclass(frozen=True)
-class _DhTable:
-    """The table: names of the joints, empty if there are none; `rows` (n, 4) of theta,
-    d, a and alpha, rad and m; and notes how its columns were understood."""
-
-    joint_names: list[str]
-    rows: np.ndarray
-    notes: list[str]
-
-
-def _total_shift(words: list[str]) -> float:
-    """Sum of the lengths of the shifts in a chain, m."""
-    shifts = (_SHIFT.fullmatch(text) for text in words)
+def _sum_lengths(words: list[str]) -> float:
+    """Sum the lengths of the shifts in a chain, m."""
+    shifts = (_SHIFT.fullmatch(word) for word in words)
     return sum(abs(float(shift[1])) for shift in shifts if shift)
 
 
@@ -185,14 +218,19 @@ def _read_table(path: str | Path, options: DhOptions) -> _DhTable:
     scales = {name: UNITS[_KINDS[name]][unit] for name, unit in units.items()}
     cells = text.cells(headers, scales)
     if "type" in headers:
-        _check_types(cells)
+        is_revolute = [
+            joint_type.upper()[:1] in ("R", "") for joint_type in cells.texts("type")
+        ]
+        allowed = "R (revolute); shifts and fixed parts are written into the robot file"
+        cells.refuse(~np.array(is_revolute), ["type"], allowed)
     rows = np.zeros((len(text.lines), len(_KINDS)))
     for column, name in enumerate(_KINDS):
         if name in headers:
             rows[:, column] = cells.numbers(name)
-            _check_angles(cells, name, rows[:, column], units[name])
+            if _KINDS[name] == ANGLE:
+                _check_angles(cells, name, rows[:, column], units[name])
     joint_names = cells.texts("joint") if "joint" in headers else []
-    return _DhTable(joint_names, rows, _notes_on(text, headers, units, options))
+    return _DhTable(joint_names, rows, _describe(text, headers, units, options))
 
 
 def _find_columns(
@@ -202,8 +240,8 @@ def _find_columns(
     headers: dict[str, str] = {}
     units: dict[str, str] = {}
     for header in text.columns:
-        name, stated = (header, None) if header in _WORDS else split_unit(header)
-        if name not in (*_KINDS, *_WORDS):
+        name, stated = (header, None) if header in _WITHOUT_UNIT else split_unit(header)
+        if name not in (*_KINDS, *_WITHOUT_UNIT):
             suggestion = suggest_names(header, _USUAL)
             allowed = f"{suggestion}; import dh --ignore {header!r} leaves it out"
             raise InputError(text.path, "header", repr(header), allowed)
@@ -211,8 +249,8 @@ def _find_columns(
             raise InputError(text.path, "header", f"{name} twice", "each column once")
         headers[name] = header
         if name in _KINDS:
-            below = text.units.get(header)
-            units[name] = _unit(header, _KINDS[name], stated, below, options, text.path)
+            unit = choose_unit(text, header, stated)
+            units[name] = _check_unit(text, header, _KINDS[name], unit, options)
     for name in _NEEDED:
         if name not in headers:
             allowed = "theta_offset, d, a and alpha, such as d_m or d_mm"
@@ -220,43 +258,42 @@ def _find_columns(
     return headers, units
 
 
-def _check_types(cells: Cells) -> None:
-    """Refuse joints that are not revolute."""
-    for row, joint_type in enumerate(cells.texts("type")):
-        if joint_type.upper()[:1] not in ("R", ""):
-            allowed = (
-                "R (revolute); what shifts or is fixed is written into the robot file"
-            )
-            raise cells.fault(row, "type", allowed)
+def _check_unit(
+    text: TextTable, header: str, kind: str, unit: str | None, options: DhOptions
+) -> str:
+    """Take the unit of a column from the table, or else from an option; refuse one of
+    another kind."""
+    unit = unit or (options.angles if kind == ANGLE else options.lengths)
+    if unit in UNITS[kind]:
+        return unit
+    found = f"{header!r} in {unit}" if unit else f"no unit of {header!r}"
+    option = "--angles deg" if kind == ANGLE else "--lengths mm"
+    allowed = f"{option} or such, or {', '.join(UNITS[kind])} behind the name"
+    raise InputError(text.path, "header", found, allowed)
 
 
 def _check_angles(cells: Cells, name: str, values: np.ndarray, unit: str) -> None:
     """Refuse angles, rad, of more turns than a joint makes."""
-    if _KINDS[name] != ANGLE:
-        return
-    # A number such as 90 is in degrees, whatever unit is stated.
-    turns = 2 if unit == "rad" else MOST_TURNS
+    turns = LARGEST_TURNS
+    advice = ""
+    if unit == "rad":
+        turns = _LARGEST_TURNS_OF_RADIANS
+        advice = "; degrees are --angles deg"
     is_wrong = np.abs(values) > 2.0 * math.pi * turns
-    if is_wrong.any():
-        advice = "; degrees are --angles deg" if unit == "rad" else ""
-        allowed = f"a number, {turns} turns at most{advice}"
-        raise cells.fault(int(np.argmax(is_wrong)), name, allowed)
+    cells.refuse(is_wrong, [name], f"a number, {turns} turns at most{advice}")
 
 
-def _notes_on(
-    text: TextTable,
-    headers: dict[str, str],
-    units: dict[str, str],
-    options: DhOptions,
+def _describe(
+    text: TextTable, headers: dict[str, str], units: dict[str, str], options: DhOptions
 ) -> list[str]:
-    """Tell how the columns and the file were understood."""
-    understood = []
+    """Describe how the columns and the file were understood."""
+    columns = []
     for name, header in headers.items():
         unit = f" in {units[name]}" if name in units else ""
-        understood.append(f"{header!r} as {name}{unit}")
+        columns.append(f"{header!r} as {name}{unit}")
     dialect = text.dialect
     notes = [
-        f"read: {'; '.join(understood)}",
+        f"read: {'; '.join(columns)}",
         f"file: names of columns in line {dialect.header},"
         f" separator {dialect.separator}, decimal {dialect.decimal},"
         f" encoding {dialect.encoding}",
@@ -266,113 +303,98 @@ def _notes_on(
     return notes
 
 
-def _unit(
-    header: str,
-    kind: str,
-    stated: str | None,
-    below: str | None,
-    options: DhOptions,
-    source: str,
-) -> str:
-    """Unit of a column: behind its name, in the row under it, or of an option."""
-    if stated and below and stated != below:
-        raise InputError(
-            source,
-            "header",
-            f"{header!r} and {below!r} in the row under it",
-            "one unit",
-        )
-    option, usual, given = (
-        ("--angles", "deg", options.angles)
-        if kind == ANGLE
-        else ("--lengths", "mm", options.lengths)
-    )
-    unit = stated or below or given
-    if unit not in UNITS[kind]:
-        found = f"{header!r} in {unit}" if unit else f"no unit of {header!r}"
-        raise InputError(
-            source,
-            "header",
-            found,
-            f"{option} {usual} or such, or {', '.join(UNITS[kind])} behind the name",
-        )
-    return unit
+@dataclass(frozen=True)
+class _DhRow:
+    """Elementary transforms of a row, as names with amounts (m, rad), `before` and
+    `behind` the motion of its joint."""
+
+    before: list[tuple[str, float]]
+    behind: list[tuple[str, float]]
 
 
-def _words(rows: np.ndarray, modified: bool) -> list[str]:
-    """A chain in words, row by row."""
+def _split_rows(rows: np.ndarray, *, modified: bool) -> Iterator[_DhRow]:
+    for theta, d, a, alpha in rows.tolist():
+        across = [("Tx", a), ("Rx", alpha)]
+        if modified:
+            yield _DhRow([*across, ("Rz", theta)], [("Tz", d)])
+        else:
+            yield _DhRow([("Rz", theta)], [("Tz", d), *across])
+
+
+def _format_rows(rows: np.ndarray, *, modified: bool) -> list[str]:
+    """Format a table in the chain notation, row by row."""
     words: list[str] = []
-    for joint, (theta, d, a, alpha) in enumerate(rows.tolist(), 1):
-        across = [word("Tx", a), word("Rx", alpha)]
-        along = [word("Rz", theta), f"Rz(q{joint})", word("Tz", d)]
-        words += [*across, *along] if modified else [*along, *across]
-    return [each for each in words if each]
-
-
-def _slid_words(rows: np.ndarray, modified: bool) -> list[str]:
-    """A chain in words whose joints lie as near as their axes allow to the joint
-    before."""
-    # What stands before, between and behind the joints, which turn about z.
-    gaps = [np.eye(4)]
-    for theta, d, a, alpha in rows:
-        across = elementary("T", 0, a) @ elementary("R", 0, alpha)
-        turn = elementary("R", 2, theta)
-        shift = elementary("T", 2, d)
-        before, behind = (across @ turn, shift) if modified else (turn, shift @ across)
-        gaps[-1] = gaps[-1] @ before
-        gaps.append(behind)
-    words: list[str] = []
-    slide = 0.0
-    for number, gap in enumerate(gaps, 1):
-        here = elementary("T", 2, -slide) @ gap
-        if number < len(gaps):
-            # Of the points of the next axis the nearest one.
-            slide = -float(here[:3, 2] @ here[:3, 3])
-            here = here @ elementary("T", 2, slide)
-        words += [
-            *displacement_words(here),
-            *([f"Rz(q{number})"] if number < len(gaps) else []),
-        ]
+    for joint, row in enumerate(_split_rows(rows, modified=modified), 1):
+        words += format_words(row.before)
+        words.append(f"Rz(q{joint})")
+        words += format_words(row.behind)
     return words
 
 
-def _robot_from_kinematics(path: str | Path, name: str | None) -> Imported:
-    """Read the robot of a kinematics file, its links in the order of the arm."""
+def _format_short_chain(rows: np.ndarray, *, modified: bool) -> list[str]:
+    """Format a table in the chain notation, with each joint frame at the point of its axis
+    that is closest to the joint frame before."""
+    # Fixed transforms before, between and behind the joints, which turn about z.
+    fixed = [np.eye(4)]
+    for row in _split_rows(rows, modified=modified):
+        fixed[-1] = fixed[-1] @ _multiply(row.before)
+        fixed.append(_multiply(row.behind))
+    words: list[str] = []
+    slide = 0.0
+    for joint, transform in enumerate(fixed[:-1], 1):
+        transform = make_elementary_transform("T", 2, -slide) @ transform
+        # Take the point of the next axis that is closest to the current origin.
+        slide = -float(transform[:3, 2] @ transform[:3, 3])
+        transform = transform @ make_elementary_transform("T", 2, slide)
+        words += [*format_displacement(transform), f"Rz(q{joint})"]
+    last = make_elementary_transform("T", 2, -slide) @ fixed[-1]
+    return [*words, *format_displacement(last)]
+
+
+def _multiply(transforms: Iterable[tuple[str, float]]) -> np.ndarray:
+    """Multiply elementary transforms, ndarray (4, 4)."""
+    return reduce(
+        np.matmul,
+        [
+            make_elementary_transform(name[0], "xyz".index(name[1]), amount)
+            for name, amount in transforms
+        ],
+    )
+
+
+def _robot_from_kinematics(path: str | Path, name: str) -> ImportedRobot:
+    """Import the robot of a kinematics file, its links in the order of the arm."""
     source = Path(path).as_posix()
     links, has_digest = _read_links(path)
     words: list[str] = []
+    joint_names = []
+    understood = []
     for joint, (link, origin) in enumerate(links.items(), 1):
         values = _read_origin(origin, source, f"{_KINEMATICS}.{link}")
-        words += displacement_words(origin_transform(values[:3], values[3:]))
+        words += format_displacement(make_origin_transform(values[:3], values[3:]))
         words.append(f"Rz(q{joint})")
-    joint_names = [_JOINTS.get(link, link) for link in links]
-    last_link = [*links][-1]
-    chain = " ".join([*words, f"[{point_name(last_link)}]"])
+        joint_name = _JOINTS.get(link, link)
+        joint_names.append(joint_name)
+        understood.append(f"q{joint} is {joint_name} of {link!r}")
     document = {
-        "name": name or Path(path).stem,
+        "name": name,
         "joint_names": joint_names,
-        "chain": chain,
+        "chain": " ".join([*words, f"[{format_point_name([*links][-1])}]"]),
     }
-    joints = [
-        f"q{joint} is {joint_name} of {link!r}"
-        for joint, (joint_name, link) in enumerate(
-            zip(joint_names, links, strict=True), 1
-        )
-    ]
-    notes = [f"read: {', '.join(joints)}"]
+    notes = [f"read: {', '.join(understood)}"]
     if has_digest:
         notes.append("not used: hash")
     notes += _LACKS
     notes.append(
         "base axes are the controller's (base, not base_link, which is turned half round)"
     )
-    options = "the kinematics of a calibrated robot as ROS has them"
-    return check_imported(document, path, options, notes)
+    description = "the kinematics of a calibrated robot as ROS has them"
+    return check_imported(document, path, description, notes)
 
 
 def _read_links(path: str | Path) -> tuple[dict[str, Any], bool]:
     """Read the entries of the links of a kinematics file, in the order of the arm, and
-    whether a digest of the calibration is among them."""
+    whether the file has a digest of the calibration."""
     source = Path(path).as_posix()
     document = read_document(path)
     if not isinstance(document, dict) or _KINEMATICS not in document:
@@ -386,14 +408,13 @@ def _read_links(path: str | Path) -> tuple[dict[str, Any], bool]:
     if not links:
         raise InputError(source, _KINEMATICS, "no link", allowed)
     if set(links) <= set(_JOINTS):
-        links = {link: links[link] for link in _JOINTS if link in links}
-        last_link = [*links][-1]
-        for link in _JOINTS:
-            if link == last_link:
-                break
-            if link not in links:
-                allowed = f"every link before {last_link}"
-                raise InputError(source, _KINEMATICS, f"no link {link}", allowed)
+        # The table of Universal Robots has the order of the arm.
+        in_order = [link for link in _JOINTS if link in links]
+        for link, expected in zip(in_order, _JOINTS, strict=False):
+            if link != expected:
+                allowed = f"every link before {in_order[-1]}"
+                raise InputError(source, _KINEMATICS, f"no link {expected}", allowed)
+        links = {link: links[link] for link in in_order}
     return links, "hash" in entries
 
 
@@ -408,8 +429,7 @@ def _read_origin(origin: object, source: str, key: str) -> list[float]:
     for name in _KEYS:
         value = parse_number(str(origin[name]))
         if value is None:
-            raise InputError(
-                source, f"{key}.{name}", repr(origin[name]), NUMBER_ALLOWED
-            )
+            found = repr(origin[name])
+            raise InputError(source, f"{key}.{name}", found, NUMBER_ALLOWED)
         values.append(value)
     return values

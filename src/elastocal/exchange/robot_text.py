@@ -1,15 +1,15 @@
-"""A robot that was read of a file of another kind: its fixed transforms in words of the
-chain notation, and its robot file.
+"""The robot file of a robot that was imported from a file of another format.
 
-A rigid displacement becomes ``Tx Ty Tz Rz Ry Rx``, the rotation by yaw, pitch and roll;
-what is zero is left out.
+Fixed transforms become words of the chain notation. A rigid displacement becomes ``Tx Ty
+Tz Rz Ry Rx``, with its rotation as yaw, pitch and roll; elementary transforms of zero
+size are omitted.
 """
 
 import hashlib
 import math
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,21 +24,28 @@ from elastocal.io.documents import check_document, format_one_line
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import parse_robot
 
+# Column of a robot file at which comments, the chain and limits are wrapped. Other entries
+# are not: a name may contain several blanks in a row, which wrapping would join.
 _WIDTH = 128
-# A joint may count any number of turns; a thousand are a mistake.
-MOST_TURNS = 1000
-# Picometres, and as many degrees: a chain of any length keeps to far less than a
-# nanometre, and cos(90 deg) is no length.
+_WRAPPED = ("chain", "joint_limits_deg")
+# Upper bound on the turns of an angle. A joint may count many turns; a thousand are a
+# mistake.
+LARGEST_TURNS = 1000
+# Decimals of lengths (m) and angles (deg): picometres, and as many degrees. The rounding
+# errors of a long chain add up to far less than a nanometre, and cos(90 deg) becomes 0.
 _DECIMALS = 12
 
 
 @dataclass(frozen=True)
-class Imported:
-    """A robot that was read of a file of another kind.
+class ImportedRobot:
+    """A robot that was imported from a file of another format.
 
-    `document`: contents of its robot file. `robot`: the same, as it is used. `origin`:
-    where it came from: file, digest and options, in a sentence. `notes`: what is to be
-    known of it, and what it lacks.
+    Attributes
+    ----------
+    document : contents of its robot file.
+    robot : the robot that this file describes.
+    origin : sentence that states the source file, its digest and the import options.
+    notes : assumptions that were made, and what the robot file lacks.
     """
 
     document: dict[str, Any]
@@ -47,193 +54,237 @@ class Imported:
     notes: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class AxisWords:
+    """Chain notation of a joint that moves about or along an axis.
+
+    The chain has joints about x, y and z only. A joint with an oblique axis moves about z,
+    between a fixed rotation and its inverse.
+
+    Attributes
+    ----------
+    before : words of the rotation that turns z into the axis; empty for x, y and z.
+    letter : axis of the joint in the rotated frame.
+    sign : "-" if the joint moves about the negative axis, otherwise "".
+    after : words of the rotation back.
+    rotation : fixed rotation before the joint, (3, 3).
+    """
+
+    before: list[str]
+    letter: str
+    sign: str
+    after: list[str]
+    rotation: np.ndarray
+
+
 def check_imported(
     document: dict[str, Any], path: str | Path, options: str, notes: Sequence[str]
-) -> Imported:
-    """Check the contents of a robot file that were made from another file, `path`,
-    which was read as `options` say.
+) -> ImportedRobot:
+    """Check the contents of a robot file that were made from a file of another format.
 
-    An InputError refuses a robot that no robot file may describe.
+    Parameters
+    ----------
+    document : contents of the robot file
+    path : file from which they were made
+    options : how that file was read, for the sentence about the origin
+    notes : assumptions that were made
+
+    Raises
+    ------
+    InputError
+        A robot file cannot describe such a robot.
     """
     source = Path(path).as_posix()
     check_document(document, "robot", source)
     robot = parse_robot(document, source)
     digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()
-    missing = ["no rated load (payload_kg)"] if robot.payload_kg is None else []
+    missing = []
     if not robot.compliance_known:
-        missing.insert(
-            0,
-            "no compliances: set `compliance: identify` in campaign.yaml, or write them here",
+        missing.append(
+            "no compliances: set `compliance: identify` in campaign.yaml, or write them"
+            " here"
         )
+    if robot.payload_kg is None:
+        missing.append("no rated load (payload_kg)")
     origin = f"From {Path(path).name} (sha256 {digest[:16]}), {options}."
-    return Imported(document, robot, origin, (*notes, *missing))
+    return ImportedRobot(document, robot, origin, (*notes, *missing))
 
 
-def point_name(link: str) -> str:
-    """A link's name as that of a measuring point: blanks and brackets, which the
-    notation needs, become underscores."""
+def format_point_name(link: str) -> str:
+    """Format the name of a link as that of a measuring point.
+
+    Blanks and brackets become underscores, because the chain notation needs them.
+    """
     return re.sub(r"[\[\]\s]", "_", link)
 
 
-def robot_text(result: Imported) -> str:
-    """The text of a robot file."""
-    head = []
-    for text in (
-        result.origin,
-        *(f"{note[:1].upper()}{note[1:]}." for note in result.notes),
-    ):
-        # Whatever a file's name holds stays inside of a comment.
-        plain = "".join(
-            character if character.isprintable() else "?" for character in text
+def format_robot_file(imported: ImportedRobot) -> str:
+    """Format the text of a robot file, with origin and notes as comments."""
+    comments = [imported.origin]
+    comments += [f"{note[:1].upper()}{note[1:]}." for note in imported.notes]
+    lines: list[str] = []
+    for comment in comments:
+        # The name of a file may hold a line break, which would end the comment.
+        printable = "".join(
+            character if character.isprintable() else "?" for character in comment
         )
-        head += textwrap.wrap(
-            plain,
+        lines += textwrap.wrap(
+            printable,
             _WIDTH,
             initial_indent="# ",
             subsequent_indent="# ",
             break_on_hyphens=False,
         )
-    body: list[str] = []
-    for key, value in result.document.items():
+    for key, value in imported.document.items():
+        entry = f"{key}: {format_one_line(value)}"
         if key == "masses":
-            body += ["masses:", *(f"  - {format_one_line(entry)}" for entry in value)]
-        else:
-            # A name may have blanks that a break of the line would join.
-            width = _WIDTH if key in ("chain", "joint_limits_deg") else 10**6
-            line = f"{key}: {format_one_line(value)}"
-            body += textwrap.wrap(
-                line,
-                width,
+            lines += ["masses:", *(f"  - {format_one_line(mass)}" for mass in value)]
+        elif key in _WRAPPED:
+            lines += textwrap.wrap(
+                entry,
+                _WIDTH,
                 subsequent_indent="  ",
                 break_on_hyphens=False,
                 break_long_words=False,
             )
-    return "\n".join([*head, *body, ""])
+        else:
+            lines.append(entry)
+    return "\n".join([*lines, ""])
 
 
-def write_robot(result: Imported, path: str | Path) -> None:
-    """Write a robot file, which appears whole or not at all; a place that cannot be
-    written to is refused."""
+def write_robot(imported: ImportedRobot, path: str | Path) -> None:
+    """Write a robot file, which appears complete or not at all.
+
+    Raises `InputError` if the file cannot be written.
+    """
     try:
-        write_text(path, robot_text(result))
+        write_text(path, format_robot_file(imported))
     except OSError as error:
-        raise InputError(
-            path, "", describe_os_error(error), "a place for a file"
-        ) from None
+        allowed = "a place for a file"
+        raise InputError(path, "", describe_os_error(error), allowed) from None
 
 
-def summary(result: Imported) -> list[str]:
-    """What was read, and what is to be known of it, in a few lines."""
-    robot = result.robot
-    shifts = sum(robot.chain.prismatic)
-    kinds = format_count(robot.joints, "joint") + (
-        f", {shifts} of them prismatic" if shifts else ""
+def summarize_import(imported: ImportedRobot) -> list[str]:
+    """Summarize an imported robot and its notes in a few lines."""
+    robot = imported.robot
+    joints = format_count(robot.joints, "joint")
+    prismatic = sum(robot.chain.prismatic)
+    if prismatic:
+        joints += f", {prismatic} of them prismatic"
+    length = math.fsum(
+        abs(transform.constant)
+        for transform in robot.chain.transforms
+        if transform.kind == "T"
     )
-    reach = math.fsum(abs(t.constant) for t in robot.chain.transforms if t.kind == "T")
-    weight = math.fsum(mass.mass_kg for mass in robot.masses)
+    weight = ""
+    if robot.masses:
+        weight = f", {math.fsum(mass.mass_kg for mass in robot.masses):.4g} kg"
+    points = ", ".join(point.name for point in robot.chain.points)
     return [
-        result.origin,
-        f"{robot.name}: {kinds}, {reach:.4g} m stretched out{f', {weight:.4g} kg' if robot.masses else ''}",
-        f"measuring points: {', '.join(point.name for point in robot.chain.points)}",
-        *(f"note: {note}" for note in result.notes),
+        imported.origin,
+        f"{robot.name}: {joints}, {length:.4g} m stretched out{weight}",
+        f"measuring points: {points}",
+        *(f"note: {note}" for note in imported.notes),
     ]
 
 
-def refuse_existing(path: str | Path, force: bool) -> None:
-    """Refuse a path where something is already, but for a file with `force`."""
+def refuse_existing(path: str | Path, *, force: bool) -> None:
+    """Refuse an output path that is a folder or in no folder, and, unless `force`, one
+    that exists already."""
     if Path(path).is_dir() or not Path(path).resolve().parent.is_dir():
-        raise InputError(
-            path, "", "no place for a file", "a file in a folder that is there"
-        )
+        allowed = "a file in an existing folder"
+        raise InputError(path, "", "no place for a file", allowed)
     check_places(path)
     if Path(path).exists() and not force:
-        raise InputError(
-            path,
-            "",
-            "a file that is there already",
-            "another --output, or --force to replace it",
-        )
+        allowed = "another --output, or --force to replace it"
+        raise InputError(path, "", "a file that exists already", allowed)
 
 
-def displacement_words(transform: np.ndarray) -> list[str]:
-    """A homogeneous transform (4, 4) in words."""
-    amounts = dict(zip(("Tx", "Ty", "Tz"), transform[:3, 3], strict=True))
-    amounts |= dict(
-        zip(("Rz", "Ry", "Rx"), yaw_pitch_roll(transform[:3, :3]), strict=True)
-    )
-    return [text for name, amount in amounts.items() if (text := word(name, amount))]
-
-
-def word(name: str, amount: float) -> str:
-    """``Tx(0.5)`` of m, ``Rx(90deg)`` of rad; empty for nothing."""
-    turns = name.startswith("R")
-    amount = round(math.degrees(amount) if turns else amount, _DECIMALS)
-    text = np.format_float_positional(abs(amount), trim="-")
-    return (
-        f"{name}({'-' if amount < 0 else ''}{text}{'deg' if turns else ''})"
-        if amount
-        else ""
+def format_displacement(transform: np.ndarray) -> list[str]:
+    """Format a homogeneous transform (4, 4) in words of the chain notation."""
+    return format_words(
+        [
+            *zip(("Tx", "Ty", "Tz"), transform[:3, 3], strict=True),
+            *zip(
+                ("Rz", "Ry", "Rx"),
+                compute_yaw_pitch_roll(transform[:3, :3]),
+                strict=True,
+            ),
+        ]
     )
 
 
-def express_axis(axis: np.ndarray) -> tuple[list[str], str, str, list[str], np.ndarray]:
-    """A joint's axis (3,), not zero, as one of the chain's, between a fixed rotation
-    and its inverse where it is oblique.
+def format_words(transforms: Iterable[tuple[str, float]]) -> list[str]:
+    """Format elementary transforms, such as ``Tx(0.5)`` and ``Rx(90deg)``.
 
-    Returns `before`: words of the rotation that turns z into the axis, empty for x, y
-    and z; `letter`, `sign`: of the axis then, and "-" or ""; `after`: words of the
-    rotation back; the fixed rotation before, as a matrix (3, 3).
+    `transforms` are names with amounts, in m for ``T`` and rad for ``R``. Transforms
+    whose amount rounds to zero are omitted.
     """
+    words = []
+    for name, amount in transforms:
+        unit = ""
+        if name.startswith("R"):
+            amount = math.degrees(amount)
+            unit = "deg"
+        amount = round(amount, _DECIMALS)
+        if amount:
+            number = np.format_float_positional(amount, trim="-")
+            words.append(f"{name}({number}{unit})")
+    return words
+
+
+def express_axis(axis: np.ndarray) -> AxisWords:
+    """Express the axis of a joint, (3,) and not zero, in the chain notation."""
     unit = np.asarray(axis, float) / np.linalg.norm(axis)
-    along = int(np.argmax(np.abs(unit)))
-    if np.abs(np.delete(unit, along)).max() < 10.0**-_DECIMALS:
-        return [], "xyz"[along], "-" if unit[along] < 0 else "", [], np.eye(3)
-    turns = [
-        ("Rz", math.atan2(unit[1], unit[0])),
-        ("Ry", math.atan2(math.hypot(unit[0], unit[1]), unit[2])),
-    ]
-    before = [text for name, angle in turns if (text := word(name, angle))]
-    after = [text for name, angle in reversed(turns) if (text := word(name, -angle))]
-    angles = [math.radians(round(math.degrees(angle), _DECIMALS)) for _, angle in turns]
-    return before, "z", "", after, Rotation.from_euler("ZY", angles).as_matrix()
+    largest = int(np.argmax(np.abs(unit)))
+    if np.abs(np.delete(unit, largest)).max() < 10.0**-_DECIMALS:
+        sign = "-" if unit[largest] < 0 else ""
+        return AxisWords([], "xyz"[largest], sign, [], np.eye(3))
+    yaw = math.atan2(unit[1], unit[0])
+    pitch = math.atan2(math.hypot(unit[0], unit[1]), unit[2])
+    # The rotation has the rounded angles of its words.
+    rounded = [round(math.degrees(angle), _DECIMALS) for angle in (yaw, pitch)]
+    rotation = Rotation.from_euler("ZY", np.radians(rounded)).as_matrix()
+    before = format_words([("Rz", yaw), ("Ry", pitch)])
+    after = format_words([("Ry", -pitch), ("Rz", -yaw)])
+    return AxisWords(before, "z", "", after, rotation)
 
 
-def yaw_pitch_roll(rotation: np.ndarray) -> tuple[float, float, float]:
-    """Angles of R (3, 3) = Rz(yaw) Ry(pitch) Rx(roll), rad.
+def compute_yaw_pitch_roll(rotation: np.ndarray) -> tuple[float, float, float]:
+    """Compute the angles of R (3, 3) = Rz(yaw) Ry(pitch) Rx(roll), rad.
 
-    Near a pitch of 90 deg yaw and roll are not separate; the roll is read of what the
-    yaw leaves, so that the product is right.
+    Near a pitch of 90 deg, yaw and roll are not separate. The roll is therefore computed
+    from Rz(-yaw) R, so that the product is right.
     """
-    level = math.hypot(rotation[0, 0], rotation[1, 0])
-    yaw = (
-        math.atan2(rotation[1, 0], rotation[0, 0]) if level > 10.0**-_DECIMALS else 0.0
-    )
-    rest = Rotation.from_euler("z", -yaw).as_matrix() @ rotation
-    return yaw, math.atan2(-rotation[2, 0], level), math.atan2(-rest[1, 2], rest[1, 1])
+    cos_pitch = math.hypot(rotation[0, 0], rotation[1, 0])
+    yaw = 0.0
+    if cos_pitch > 10.0**-_DECIMALS:
+        yaw = math.atan2(rotation[1, 0], rotation[0, 0])
+    unyawed = Rotation.from_euler("z", -yaw).as_matrix() @ rotation
+    pitch = math.atan2(-rotation[2, 0], cos_pitch)
+    return yaw, pitch, math.atan2(-unyawed[1, 2], unyawed[1, 1])
 
 
-def elementary(kind: str, axis: int, amount: float) -> np.ndarray:
-    """Shift (``T``, m) along or turn (``R``, rad) about an axis, 0 to 2, ndarray (4,
-    4)."""
-    along = amount * np.eye(3)[axis]
-    return (
-        homogeneous(Rotation.from_rotvec(along).as_matrix())
-        if kind == "R"
-        else homogeneous(np.eye(3), along)
-    )
+def make_elementary_transform(kind: str, axis: int, amount: float) -> np.ndarray:
+    """Make a shift (``T``, m) along or a rotation (``R``, rad) about an axis, 0 to 2, as
+    (4, 4) array."""
+    vector = amount * np.eye(3)[axis]
+    if kind == "R":
+        return make_transform(Rotation.from_rotvec(vector).as_matrix())
+    return make_transform(np.eye(3), vector)
 
 
-def homogeneous(
+def make_transform(
     rotation: np.ndarray, shift: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0)
 ) -> np.ndarray:
-    """A turn (3, 3) and a shift (3,) as one, ndarray (4, 4)."""
-    found = np.eye(4)
-    found[:3, :3] = rotation
-    found[:3, 3] = shift
-    return found
+    """Make a homogeneous transform (4, 4) of a rotation (3, 3) and a shift (3,)."""
+    transform = np.eye(4)
+    transform[:3, :3] = rotation
+    transform[:3, 3] = shift
+    return transform
 
 
-def origin_transform(xyz: Sequence[float], rpy: Sequence[float]) -> np.ndarray:
-    """Shift (m), then turn by roll, pitch and yaw (rad) as the origin of a URDF has
-    them, ndarray (4, 4)."""
-    return homogeneous(Rotation.from_euler("xyz", rpy).as_matrix(), xyz)
+def make_origin_transform(xyz: Sequence[float], rpy: Sequence[float]) -> np.ndarray:
+    """Make the homogeneous transform (4, 4) of an origin in a URDF: a shift (m), then a
+    rotation by roll, pitch and yaw (rad)."""
+    return make_transform(Rotation.from_euler("xyz", rpy).as_matrix(), xyz)

@@ -124,7 +124,7 @@ def _read_all_or_none(
     return cells.matrix(names)
 
 
-def read_target_path_of(path: str | Path, robot: Robot) -> TargetPath:
+def read_target_path_for(path: str | Path, robot: Robot) -> TargetPath:
     """As `read_target_path`; an InputError refuses joint angles in degrees too."""
     wanted = read_target_path(path, robot.joints)
     if wanted.start is not None and (wrong := find_degrees(wanted.start, robot)).any():

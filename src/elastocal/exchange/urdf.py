@@ -1,13 +1,14 @@
 """A URDF file, read safely, and the serial chain between two of its links as the
 contents of a robot file.
 
-The Unified Robot Description Format (wiki.ros.org/urdf/XML) is XML. No document type is
-accepted, and so no entity that grows or fetches another file; no other file is opened.
+The Unified Robot Description Format (wiki.ros.org/urdf/XML) is XML. Document types are
+refused, and with them entities that grow without end or fetch another file; no other
+file is opened.
 
-A joint is a fixed transform (``origin``), which becomes ``Tx Ty Tz Rz Ry Rx``, and then
-a motion about or along an axis; one that is not x, y or z is turned into z and back.
-All that a joint carries rigidly is one mass, side branches and what stands behind the
-tip included.
+A joint is a fixed transform (``origin``), which becomes ``Tx Ty Tz Rz Ry Rx``, followed by
+a motion about or along an axis. An axis other than x, y or z is rotated into z and back.
+Everything that a joint carries rigidly becomes one mass, including side branches and the
+links behind the tip.
 """
 
 import math
@@ -26,31 +27,31 @@ import numpy as np
 from elastocal.counting import list_first
 from elastocal.errors import InputError, suggest_names
 from elastocal.exchange.robot_text import (
-    Imported,
+    ImportedRobot,
     check_imported,
-    displacement_words,
     express_axis,
-    homogeneous,
-    origin_transform,
-    point_name,
+    format_displacement,
+    format_point_name,
+    make_origin_transform,
+    make_transform,
 )
 from elastocal.io.texts import LARGEST_NUMBER, parse_number, read_bytes
 from elastocal.mechanics.robot import STANDARD_GRAVITY, UNLIMITED_DEG
 
-# The longest public descriptions, of humanoids with hands, have less than a megabyte.
+# Upper bound on the size of a file. The longest public descriptions, of humanoids with
+# hands, have less than a megabyte.
 LARGEST_BYTES = 20_000_000
-# Elements, and how deep in each other: each takes memory many times its size in the
-# file.
+# Upper bounds on the number of elements and on their nesting. In memory an element takes
+# many times its size in the file.
 _MOST_ELEMENTS = 200_000
 _DEEPEST = 50
-# Whole cells with grippers and cameras have some hundred links; each is followed to the
-# root.
+# Upper bound on links and on joints. Whole cells with grippers and cameras have some
+# hundred links, and each is followed up to the root.
 _MOST_PARTS = 2000
 _MOVING = {"revolute": "R", "continuous": "R", "prismatic": "T"}
 _KINDS = (*_MOVING, "fixed", "floating", "planar")
 _XACRO = "a URDF; this is xacro, run it first: xacro FILE > robot.urdf"
-# How many numbers each attribute has that is read, by its element and name, and what
-# they are where nothing states them.
+# Attributes with numbers, by element and name: how many numbers, and the default text.
 _NUMBERS = {
     ("origin", "xyz"): (3, "0 0 0"),
     ("origin", "rpy"): (3, "0 0 0"),
@@ -59,26 +60,39 @@ _NUMBERS = {
     ("limit", "upper"): (1, "0"),
     ("mass", "value"): (1, ""),
 }
-# Limits to a billionth of a degree, or to a nanometre; gravity to so many m/s²; masses
-# to so many kg.
+# Upper bound on the numbers of a limit: programs write 1e16 and more if a joint has none.
+_LARGEST_LIMIT = 1e100
+# A shorter axis has a direction that is only rounding error.
+_SHORTEST_AXIS = 1e-9
+# Decimals in the robot file of limits (deg, m), gravity (m/s²), masses (kg) and their
+# centres (m).
 _DECIMALS = 9
-# How well masses are known, as a standard deviation over the value. A URDF does not say
-# where they come from: of a drawing without cables, grease and covers, or guessed;
-# where dynamic parameters of robots were identified, masses and centres of such models
-# were off by a tenth to a third.
+# Standard deviation of the masses over their values. A URDF does not say whether they were
+# guessed, or come from a drawing without cables, grease and covers. Where dynamic
+# parameters of robots were identified, masses and centres of such models were off by a
+# tenth to a third.
 _MASS_STD = 0.2
-# Two turns, and rounding; limits in degrees are farther, and so are those of programs
-# where a joint has none.
+# Upper bound on a limit in radians: two turns and rounding. Limits in degrees are larger,
+# and so are those that programs write if a joint has none.
 _FARTHEST_RAD = 4.0 * math.pi + 0.01
-# So many links of a robot never weigh the same; links and joints that a note names.
+# At least this many links of equal mass are placeholders.
 _FEWEST_ALIKE = 3
+# Number of joints that a note names.
 _NAMED = 4
 
 
 @dataclass(frozen=True)
 class Joint:
-    """`origin` (4, 4) is in the parent's frame, `axis` (3,) in its own; limits that are
-    not stated are 0."""
+    """A joint of a URDF.
+
+    Attributes
+    ----------
+    name, kind, parent, child : as the file has them.
+    origin : transform (4, 4) from the parent's frame.
+    axis : direction (3,) in the joint's own frame.
+    lower, upper : limits, rad or m; 0 if they are not stated.
+    mimics : whether the joint follows another one.
+    """
 
     name: str
     kind: str
@@ -90,14 +104,24 @@ class Joint:
     upper: float
     mimics: bool
 
+    @property
+    def has_limits_in_radians(self) -> bool:
+        """Whether the limits exist and can be radians."""
+        is_stated = self.lower < self.upper
+        return is_stated and max(-self.lower, self.upper) <= _FARTHEST_RAD
+
 
 @dataclass(frozen=True)
 class Urdf:
-    """A tree of links: every name once, every joint between two of them.
+    """A tree of links, with unique names and with every joint between two links.
 
-    `moments` (4,): of each link by its name the mass times its centre in the link's
-    frame (kg m), and the mass (kg, 0 where none is stated). `above`: the joint that
-    carries a link, by the link's name; the root has none.
+    Attributes
+    ----------
+    name : name of the robot.
+    moments : by the name of a link, (4,): its mass times its centre in the link's frame
+        (kg m), and the mass (kg, 0 if none is stated).
+    joints : in the order of the file.
+    above : joint that carries a link, by the link's name; the root has none.
     """
 
     name: str
@@ -106,27 +130,29 @@ class Urdf:
     above: dict[str, Joint]
 
     def joints_above(self, link: str) -> Iterator[Joint]:
-        """The joints that carry a link, the nearest first, to the root."""
+        """Iterate over the joints that carry a link, from the nearest to the root."""
         while link in self.above:
             yield self.above[link]
             link = self.above[link].parent
 
     def path_to(self, tip: str, base: str | None) -> list[Joint]:
-        """The joints from a link, or from the root of the tree where it does not carry
-        the tip, to the tip."""
-        return [*takewhile(lambda joint: joint.child != base, self.joints_above(tip))][
-            ::-1
-        ]
+        """List the joints from `base` to `tip`; from the root of the tree if `base` does
+        not carry the tip."""
+        path = takewhile(lambda joint: joint.child != base, self.joints_above(tip))
+        return [*path][::-1]
 
 
 @dataclass(frozen=True)
 class UrdfChain:
-    """The chain between two links: in the notation, with measuring points; the joints
-    of q1, q2, ...
+    """The serial chain between two links.
 
-    `links`: of each link on it the number of the joint that carries it, 0 for the
-    column, and its frame (4, 4) in the one directly behind that joint, all joints at
-    zero.
+    Attributes
+    ----------
+    notation : the chain with its measuring points in the chain notation.
+    joints : the joints of q1, q2, ...
+    links : by the name of each link on the chain, the number of the joint that carries
+        it, 0 for the column; and its frame (4, 4) in the frame directly behind that
+        joint.
     """
 
     notation: str
@@ -136,160 +162,165 @@ class UrdfChain:
 
 def robot_from_urdf(
     path: str | Path, base: str, tip: str, points: Sequence[str] = ()
-) -> Imported:
-    """The robot between two links of a URDF: its base frame, and its last measuring
-    point; `points` between become others."""
+) -> ImportedRobot:
+    """Import the robot between two links of a URDF.
+
+    Parameters
+    ----------
+    path : URDF file
+    base : link whose frame is the robot's base frame
+    tip : link whose frame is the last measuring point
+    points : links between them that are measuring points too
+    """
     urdf = read_urdf(path)
     source = str(path)
-    chain = chain_between(urdf, base, tip, points, source)
-    masses, notes = _weights(urdf, chain)
-    notes.insert(
-        0,
-        f"read: {', '.join(f'q{n} from {joint.name!r}' for n, joint in enumerate(chain.joints, 1))}",
+    chain = find_chain(urdf, base, tip, points, source)
+    masses, mass_notes = _list_masses(urdf, chain)
+    joints = ", ".join(
+        f"q{number} from {joint.name!r}" for number, joint in enumerate(chain.joints, 1)
     )
-    limits = [_limits(joint, notes, source) for joint in chain.joints]
+    notes = [f"read: {joints}", *mass_notes]
     document: dict[str, Any] = {
         "name": urdf.name,
         "joint_names": [joint.name for joint in chain.joints],
+        "chain": chain.notation,
+        "joint_limits_deg": [_convert_limits(joint, source) for joint in chain.joints],
     }
-    document |= {"chain": chain.notation, "joint_limits_deg": limits}
-    # The tree's root is upright.
-    before = np.linalg.multi_dot(
-        [np.eye(4), np.eye(4), *(joint.origin for joint in urdf.path_to(base, None))]
-    )
-    gravity = np.round(-STANDARD_GRAVITY * before[2, :3], _DECIMALS) + 0.0
+    for joint in chain.joints:
+        if joint.kind == "revolute" and not joint.has_limits_in_radians:
+            limits = "no limits in the URDF"
+            if joint.lower < joint.upper:
+                limits = f"limits of {joint.lower:g} to {joint.upper:g}, no radians"
+            notes.append(f"joint {joint.name!r} has {limits}: a turn either way")
+    # The root of the tree stands upright.
+    transform = np.eye(4)
+    for joint in urdf.path_to(base, None):
+        transform = transform @ joint.origin
+    gravity = np.round(-STANDARD_GRAVITY * transform[2, :3], _DECIMALS) + 0.0
     if gravity[2] != -STANDARD_GRAVITY:
         document["gravity_m_s2"] = gravity.tolist()
         notes.append(
-            f"gravity as at {base!r} where the root of the tree stands upright and the joints before it are at zero"
+            f"gravity as at {base!r} where the root of the tree stands upright and the"
+            " joints before it are at zero"
         )
     if masses:
         document["masses"] = masses
         notes.append(
-            f"masses are known to {100 * _MASS_STD:g} %, by assumption: a URDF does not say"
+            f"masses are known to {100 * _MASS_STD:g} %, by assumption: a URDF does not"
+            " say"
         )
-    if beside := [
+    omitted = [
         joint.name
         for joint in urdf.joints
         if joint.kind != "fixed" and joint.child not in chain.links
-    ]:
+    ]
+    if omitted:
         notes.append(
-            f"joints that are no part of the chain, left out: {', '.join(beside)}"
+            f"joints that are no part of the chain, left out: {', '.join(omitted)}"
         )
     return check_imported(document, path, f"the links from {base!r} to {tip!r}", notes)
 
 
-def _limits(joint: Joint, notes: list[str], source: str) -> list[float]:
-    """Degrees, of prismatic joints metres; a turn either way where a joint that turns
-    has none, or none in radians."""
-    low = joint.lower
-    high = joint.upper
-    prismatic = joint.kind == "prismatic"
-    if low >= high and prismatic:
+def _convert_limits(joint: Joint, source: str) -> list[float]:
+    """Convert limits to degrees, or to metres if the joint is prismatic.
+
+    A revolute joint without limits in radians gets one turn either way.
+    """
+    limits = [joint.lower, joint.upper]
+    if joint.kind != "prismatic":
+        if not joint.has_limits_in_radians:
+            return list(UNLIMITED_DEG)
+        limits = [math.degrees(limit) for limit in limits]
+    elif joint.lower >= joint.upper:
+        key = f"joint {joint.name!r}: limit"
+        found = f"{joint.lower:g} to {joint.upper:g}"
         allowed = 'of a prismatic joint, <limit lower="..." upper="..."> in metres'
-        raise InputError(
-            source, f"joint {joint.name!r}: limit", f"{low:g} to {high:g}", allowed
-        )
-    if prismatic or (low < high and max(-low, high) <= _FARTHEST_RAD):
-        return [
-            round(value if prismatic else math.degrees(value), _DECIMALS)
-            for value in (low, high)
-        ]
-    if joint.kind != "continuous":
-        found = (
-            f"limits of {low:g} to {high:g}, no radians"
-            if low < high
-            else "no limits in the URDF"
-        )
-        notes.append(f"joint {joint.name!r} has {found}: a turn either way")
-    return list(UNLIMITED_DEG)
+        raise InputError(source, key, found, allowed)
+    return [round(limit, _DECIMALS) for limit in limits]
 
 
 def read_urdf(path: str | Path) -> Urdf:
-    """Links, joints and masses of a URDF file; one whose joints and links do not hold
-    together is refused."""
+    """Read links, joints and masses of a URDF file.
+
+    Raises `InputError` if its links and joints do not form a tree, or if a number cannot
+    be read.
+    """
     source = Path(path).as_posix()
-    root = _root_of(read_bytes(path, LARGEST_BYTES, "a URDF file"), source)
+    root = _parse(read_bytes(path, LARGEST_BYTES, "a URDF file"), source)
     links = root.findall("link")
-    joints = root.findall("joint")
-    _check_tree(links, joints, source)
-    moments = {}
-    for part in links:
-        called = f"link {part.attrib['name']!r}"
-        inertial = part.find("inertial")
-        mass = 0.0
-        centre = [0.0, 0.0, 0.0]
-        if inertial is not None:
-            centre = _numbers(inertial, "origin", "xyz", called, source)
-            if inertial.find("mass") is not None:
-                (mass,) = _numbers(inertial, "mass", "value", called, source)
-            if mass < 0:
-                raise InputError(
-                    source, f"{called}: mass value", f"{mass:g}", "0 or more kg"
-                )
-        moments[part.attrib["name"]] = mass * np.array([*centre, 1.0])
-    made = tuple(_joint(part, source) for part in joints)
-    return Urdf(
-        root.get("name") or Path(path).stem,
-        moments,
-        made,
-        {joint.child: joint for joint in made},
-    )
+    _check_tree(links, root.findall("joint"), source)
+    moments = {link.attrib["name"]: _read_moment(link, source) for link in links}
+    joints = tuple(_read_joint(element, source) for element in root.findall("joint"))
+    name = root.get("name") or Path(path).stem
+    return Urdf(name, moments, joints, {joint.child: joint for joint in joints})
 
 
-def _joint(part: Element, source: str) -> Joint:
-    name = part.attrib["name"]
+def _read_moment(link: Element, source: str) -> np.ndarray:
+    """Read the first moment (kg m) and the mass (kg) of a link, ndarray (4,)."""
+    inertial = link.find("inertial")
+    if inertial is None:
+        return np.zeros(4)
+    key = f"link {link.attrib['name']!r}"
+    centre = _read_numbers(inertial, "origin", "xyz", key, source)
+    mass = 0.0
+    if inertial.find("mass") is not None:
+        (mass,) = _read_numbers(inertial, "mass", "value", key, source)
+    if mass < 0:
+        raise InputError(source, f"{key}: mass value", f"{mass:g}", "0 or more kg")
+    return mass * np.array([*centre, 1.0])
+
+
+def _read_joint(element: Element, source: str) -> Joint:
+    name = element.attrib["name"]
 
     def numbers(tag: str, attribute: str) -> list[float]:
-        return _numbers(part, tag, attribute, f"joint {name!r}", source)
+        return _read_numbers(element, tag, attribute, f"joint {name!r}", source)
 
-    origin = origin_transform(numbers("origin", "xyz"), numbers("origin", "rpy"))
-    (lower,), (upper,), axis = (
-        numbers("limit", "lower"),
-        numbers("limit", "upper"),
-        np.array(numbers("axis", "xyz")),
-    )
-    ends = _end(part, "parent"), _end(part, "child")
+    origin = make_origin_transform(numbers("origin", "xyz"), numbers("origin", "rpy"))
+    (lower,) = numbers("limit", "lower")
+    (upper,) = numbers("limit", "upper")
     return Joint(
         name,
-        part.attrib["type"],
-        *ends,
+        element.attrib["type"],
+        _get_end(element, "parent"),
+        _get_end(element, "child"),
         origin,
-        axis,
+        np.array(numbers("axis", "xyz")),
         lower,
         upper,
-        part.find("mimic") is not None,
+        mimics=element.find("mimic") is not None,
     )
 
 
-def _numbers(
-    part: Element, tag: str, attribute: str, called: str, source: str
+def _read_numbers(
+    element: Element, tag: str, attribute: str, key: str, source: str
 ) -> list[float]:
-    """Numbers of an attribute of a child, or what they are where nothing states
-    them."""
+    """Read the numbers of an attribute of a child, or its default; `key` names the
+    element in errors."""
     count, default = _NUMBERS[tag, attribute]
-    child = part.find(tag)
+    child = element.find(tag)
     text = default if child is None else child.get(attribute, default)
-    # Programs write 1e16 and more where a joint has no limit.
-    largest = 1e100 if tag == "limit" else LARGEST_NUMBER
-    words = text.split(None, count)
-    numbers = [
-        number for each in words if (number := parse_number(each, largest)) is not None
-    ]
-    if not len(words) == len(numbers) == count:
-        allowed = f"{'a number' if count == 1 else f'{count} numbers'}, up to {largest:g} in size"
-        raise InputError(source, f"{called}: {tag} {attribute}", repr(text), allowed)
+    largest = _LARGEST_LIMIT if tag == "limit" else LARGEST_NUMBER
+    values = [parse_number(number, largest) for number in text.split(None, count)]
+    numbers = [value for value in values if value is not None]
+    if not len(values) == len(numbers) == count:
+        kind = "a number" if count == 1 else f"{count} numbers"
+        allowed = f"{kind}, up to {largest:g} in size"
+        raise InputError(source, f"{key}: {tag} {attribute}", repr(text), allowed)
     return numbers
 
 
-def _end(joint: Element, tag: str) -> str:
+def _get_end(joint: Element, tag: str) -> str:
+    """Name of the parent or the child of a joint, "" if there is none."""
     end = joint.find(tag)
     return "" if end is None else end.get("link", "")
 
 
 class _Builder(ElementTree.TreeBuilder):
-    """Builds a tree whose names have no namespaces; what could grow without end, and
-    what xacro has not read, is refused."""
+    """Builds a tree of elements without namespaces.
+
+    It refuses document types, trees that grow without end, and xacro.
+    """
 
     def __init__(self, source: str) -> None:
         super().__init__()
@@ -298,50 +329,48 @@ class _Builder(ElementTree.TreeBuilder):
         self.depth = 0
 
     def doctype(self, *_: object) -> None:
-        allowed = "a URDF without a document type, for entities of one could be endless or other files"
+        allowed = (
+            "a URDF without a document type, whose entities could be endless or other"
+            " files"
+        )
         raise InputError(self.source, "", "<!DOCTYPE", allowed)
 
     def start(self, tag: str, attrs: dict[str, str]) -> Element:
         uri, _, name = tag.rpartition("}")
-        self.count = self.count + 1
-        self.depth = self.depth + 1
-        if self.count > _MOST_ELEMENTS or self.depth > _DEEPEST:
-            most = (
-                f"{_DEEPEST} elements in each other"
-                if self.depth > _DEEPEST
-                else f"{_MOST_ELEMENTS} elements"
-            )
-            raise InputError(
-                self.source, "", f"more than {most}", "a URDF, which needs fewer"
-            )
+        self.count += 1
+        self.depth += 1
+        self._refuse_more_than(self.depth, _DEEPEST, "elements in each other")
+        self._refuse_more_than(self.count, _MOST_ELEMENTS, "elements")
         if "xacro" in uri:
             raise InputError(self.source, "", f"<xacro:{name}>", _XACRO)
-        if wrong := next(
-            (value for value in attrs.values() if "${" in value or "$(" in value), None
-        ):
-            raise InputError(self.source, f"<{name}>", repr(wrong), _XACRO)
+        for value in attrs.values():
+            if "${" in value or "$(" in value:
+                raise InputError(self.source, f"<{name}>", repr(value), _XACRO)
         return super().start(name, attrs)
+
+    def _refuse_more_than(self, count: int, most: int, noun: str) -> None:
+        if count > most:
+            found = f"more than {most} {noun}"
+            raise InputError(self.source, "", found, "a URDF, which needs fewer")
 
     def end(self, tag: str) -> Element:
         self.depth -= 1
         return super().end(tag.rpartition("}")[2])
 
 
-def _root_of(data: bytes, source: str) -> Element:
+def _parse(data: bytes, source: str) -> Element:
+    """Parse the bytes of a file, and return the element of the robot."""
+    parser = ElementTree.XMLParser(target=_Builder(source))
     try:
-        root = ElementTree.fromstring(
-            data, ElementTree.XMLParser(target=_Builder(source))
-        )
+        root = ElementTree.fromstring(data, parser)
     except ElementTree.ParseError as error:
-        where = f"line {error.position[0]}"
-        words = str(error).partition(":")[0]
-        raise InputError(source, where, words, "a URDF, which is XML") from None
+        key = f"line {error.position[0]}"
+        found = str(error).partition(":")[0]
+        raise InputError(source, key, found, "a URDF, which is XML") from None
+    except InputError:
+        raise
     except (ValueError, LookupError) as error:
-        raise (
-            error
-            if isinstance(error, InputError)
-            else InputError(source, "", str(error), "a URDF, which is XML")
-        ) from None
+        raise InputError(source, "", str(error), "a URDF, which is XML") from None
     if root.tag != "robot":
         raise InputError(source, "", f"<{root.tag}>", "a URDF, which is a <robot>")
     return root
@@ -361,7 +390,7 @@ def _check_tree(
         if joint_type not in _KINDS:
             found = f"type {joint_type!r}"
             raise InputError(source, key, found, " | ".join(_KINDS))
-        ends = {tag: _end(joint, tag) for tag in ("parent", "child")}
+        ends = {tag: _get_end(joint, tag) for tag in ("parent", "child")}
         for tag, link in ends.items():
             if link not in link_names:
                 found = f"{tag} {link!r}"
@@ -394,90 +423,91 @@ def _check_names(tag: str, elements: Sequence[Element], source: str) -> None:
             raise InputError(source, f"{tag} {name!r}", f"{count} times", allowed)
 
 
-def chain_between(
+def find_chain(
     urdf: Urdf, base: str, tip: str, points: Sequence[str], source: str
 ) -> UrdfChain:
-    """The chain from one link, `base`, to another that it carries; `points`, links of
-    it, and the tip are measuring points."""
-    path = _path(urdf, base, tip, source)
+    """Find the chain from one link, `base`, to another that it carries, `tip`.
+
+    The tip and `points`, which are links between the two, are measuring points.
+
+    Raises
+    ------
+    InputError
+        There is no such chain, or one of its joints cannot be part of a robot file.
+    """
+    path = _find_path(urdf, base, tip, source)
     on_chain = [base, *(joint.child for joint in path)]
     for name in points:
         if name not in on_chain:
-            allowed = (
-                f"a link between {base!r} and {tip!r}: {suggest_names(name, on_chain)}"
-            )
+            names = suggest_names(name, on_chain)
+            allowed = f"a link between {base!r} and {tip!r}: {names}"
             raise InputError(source, "point", repr(name), allowed)
-    marked = {name: point_name(name) for name in (*points, tip)}
-    if len(set(marked.values())) < len(marked):
+    marks = {name: f"[{format_point_name(name)}]" for name in (*points, tip)}
+    if len(set(marks.values())) < len(marks):
         allowed = "links whose names differ by more than blanks and brackets"
-        raise InputError(source, "point", ", ".join(map(repr, marked)), allowed)
-    words = [f"[{marked[base]}]"] if base in marked else []
+        raise InputError(source, "point", ", ".join(map(repr, marks)), allowed)
+    words = [marks.get(base, "")]
     moving: list[Joint] = []
-    body = 0
-    here = np.eye(4)
-    links = {base: (body, here)}
+    frame = np.eye(4)
+    links = {base: (0, frame)}
     for joint in path:
-        words += displacement_words(joint.origin)
-        here = here @ joint.origin
+        words += format_displacement(joint.origin)
+        frame = frame @ joint.origin
         if joint.kind in _MOVING:
-            # Of a shorter axis the direction is no more than rounding.
-            if not np.linalg.norm(joint.axis) > 1e-9:
-                axis = " ".join(f"{part:g}" for part in joint.axis)
-                raise InputError(
-                    source, f"joint {joint.name!r}: axis xyz", axis, "a direction"
-                )
             moving.append(joint)
-            before, letter, minus, after, turn = express_axis(joint.axis)
-            body = len(moving)
-            here = homogeneous(turn.T)
-            words += [*before, f"{_MOVING[joint.kind]}{letter}({minus}q{body})", *after]
-        if joint.child in marked:
-            words.append(f"[{marked[joint.child]}]")
-        links[joint.child] = (body, here)
-    return UrdfChain(" ".join(words), tuple(moving), links)
+            axis = express_axis(joint.axis)
+            coordinate = f"{axis.sign}q{len(moving)}"
+            motion = f"{_MOVING[joint.kind]}{axis.letter}({coordinate})"
+            words += [*axis.before, motion, *axis.after]
+            frame = make_transform(axis.rotation.T)
+        words.append(marks.get(joint.child, ""))
+        links[joint.child] = (len(moving), frame)
+    return UrdfChain(" ".join(filter(None, words)), tuple(moving), links)
 
 
-def _path(urdf: Urdf, base: str, tip: str, source: str) -> list[Joint]:
-    names = [*urdf.moments]
-    both = f"base {base!r}, tip {tip!r}"
+def _find_path(urdf: Urdf, base: str, tip: str, source: str) -> list[Joint]:
+    """Find the joints from one link to another; refuse those that do not make a
+    chain."""
     for key, name in (("base", base), ("tip", tip)):
-        if name not in names:
-            raise InputError(
-                source, key, repr(name), f"a link: {suggest_names(name, names)}"
-            )
+        if name not in urdf.moments:
+            allowed = f"a link: {suggest_names(name, [*urdf.moments])}"
+            raise InputError(source, key, repr(name), allowed)
+    key = f"base {base!r}, tip {tip!r}"
     path = urdf.path_to(tip, base)
     if base != (path[0].parent if path else tip):
-        turned = any(joint.parent == tip for joint in urdf.joints_above(base))
-        found = (
-            "a base that the tip carries (give them the other way round)"
-            if turned
-            else "two branches of the tree"
-        )
-        raise InputError(source, both, found, "a tip that the base carries")
+        found = "two branches of the tree"
+        if any(joint.parent == tip for joint in urdf.joints_above(base)):
+            found = "a base that the tip carries (give them the other way round)"
+        raise InputError(source, key, found, "a tip that the base carries")
     if not any(joint.kind in _MOVING for joint in path):
-        raise InputError(
-            source,
-            both,
-            "no joint that moves between them",
-            "links with joints between",
-        )
-    if wrong := next(
-        (
-            joint
-            for joint in path
-            if joint.mimics or joint.kind not in (*_MOVING, "fixed")
-        ),
-        None,
-    ):
-        found = (
-            "a joint that mimics another one" if wrong.mimics else f"type {wrong.kind}"
-        )
-        allowed = f"{' | '.join((*_MOVING, 'fixed'))}; parallel links are written in the robot file, see docs/campaign.md"
-        raise InputError(source, f"joint {wrong.name!r}", found, allowed)
+        found = "no joint that moves between them"
+        raise InputError(source, key, found, "links with joints between")
+    for joint in path:
+        _check_joint(joint, source)
     return path
 
 
-def _weights(urdf: Urdf, chain: UrdfChain) -> tuple[list[dict[str, Any]], list[str]]:
+def _check_joint(joint: Joint, source: str) -> None:
+    """Refuse a joint that cannot be part of a serial chain."""
+    key = f"joint {joint.name!r}"
+    kinds = (*_MOVING, "fixed")
+    if joint.mimics or joint.kind not in kinds:
+        found = f"type {joint.kind}"
+        if joint.mimics:
+            found = "a joint that mimics another one"
+        allowed = (
+            f"{' | '.join(kinds)}; parallel links are written in the robot file, see"
+            " docs/campaign.md"
+        )
+        raise InputError(source, key, found, allowed)
+    if joint.kind in _MOVING and not np.linalg.norm(joint.axis) > _SHORTEST_AXIS:
+        axis = " ".join(f"{component:g}" for component in joint.axis)
+        raise InputError(source, f"{key}: axis xyz", axis, "a direction")
+
+
+def _list_masses(
+    urdf: Urdf, chain: UrdfChain
+) -> tuple[list[dict[str, Any]], list[str]]:
     """List the entries of ``masses`` of a robot file, see `mechanics.robot_file`, and
     notes about them."""
     moments, joints_at_zero = _carried_moments(urdf, chain)

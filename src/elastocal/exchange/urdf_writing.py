@@ -1,51 +1,52 @@
 """The user's own URDF with the joint origins of the calibrated robot.
 
-Between two joints that move, the calibrated chain has a fixed transform that differs
-from the nominal one by a displacement E at its end, and an offset of the joint is a
-turn R about (or a shift along) its axis. With G from a joint's frame to the chain's
-before it moves, its origin O becomes O G E R G^-1; what lies behind the last joint goes
-into the last fixed joint. Joint values are those of the URDF, before and after. URDF is
-rigid: compliances are not in it.
+Between two moving joints, the fixed transform of the calibrated chain differs from the
+nominal one by a displacement E at its end. The offset of a joint is a displacement R about
+or along its axis. With G from the frame of a joint to that of the chain before it moves,
+the joint's origin O becomes O G E R G^-1. The displacement behind the last moving joint
+goes into the last fixed joint. Joint values mean the same before and after. A URDF is
+rigid, so compliances are not in it.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree as Xml
+from xml.etree import ElementTree
 
 import numpy as np
 
 from elastocal.counting import format_count
 from elastocal.errors import InputError
 from elastocal.exchange.robot_text import (
-    elementary,
+    compute_yaw_pitch_roll,
     express_axis,
-    homogeneous,
-    point_name,
-    yaw_pitch_roll,
+    format_point_name,
+    make_elementary_transform,
+    make_transform,
 )
-from elastocal.exchange.urdf import (
-    LARGEST_BYTES,
-    Joint,
-    Urdf,
-    UrdfChain,
-    chain_between,
-    read_urdf,
-)
+from elastocal.exchange.urdf import LARGEST_BYTES, Joint, Urdf, find_chain, read_urdf
 from elastocal.io.texts import read_bytes
 from elastocal.mechanics.chain import Chain, Transform, parse_chain
 from elastocal.mechanics.robot import Robot
 
-# m and rad: of rounding, in a file or in a product of transforms.
-_SAME = 1e-9
+# Upper bound on the difference of equal transforms, m and rad: rounding in a file or in a
+# product of transforms.
+_ROUNDING = 1e-9
+# Decimals of written origins, m and rad; smaller changes of an origin are not written.
 _DECIMALS = 12
-_THE_SAME = "the URDF from which the robot file was imported"
+_IMPORTED_URDF = "the URDF from which the robot file was imported"
 
 
 @dataclass(frozen=True)
 class CorrectedUrdf:
-    """The file's new contents, how many origins differ, and the links between which the
-    robot stands."""
+    """A URDF with other joint origins.
+
+    Attributes
+    ----------
+    content : contents of the file.
+    changed : number of origins that differ.
+    base, tip : links between which the file has the robot.
+    """
 
     content: bytes
     changed: int
@@ -53,144 +54,155 @@ class CorrectedUrdf:
     tip: str
 
 
+@dataclass(frozen=True)
+class _RigidLinks:
+    """A chain as transforms that move and fixed transforms between them.
+
+    Attributes
+    ----------
+    moving : transforms that move.
+    fixed : fixed transforms (4, 4) before, between and behind these, one more.
+    """
+
+    moving: list[Transform]
+    fixed: list[np.ndarray]
+
+
 def write_calibrated_origins(
     path: str | Path, nominal: Robot, calibrated: Robot
 ) -> CorrectedUrdf:
-    """A URDF of which `nominal` was imported, with the joint origins of the same robot
-    as `calibrated` has it.
+    """Write the joint origins of a calibrated robot into a URDF.
 
-    A factor or a coupling of joint values, and an error behind a last joint whose child
-    is the tip, have no place in it. An `InputError` refuses another robot's file.
+    A URDF cannot express factors and couplings of joint values, nor an error behind a last
+    moving joint whose child is the tip.
+
+    Parameters
+    ----------
+    path : URDF file
+    nominal : robot that was imported from it
+    calibrated : the same robot, calibrated
+
+    Raises
+    ------
+    InputError
+        The file has another robot.
     """
     source = Path(path).as_posix()
     content = read_bytes(path, LARGEST_BYTES, "a URDF file")
     urdf = read_urdf(path)
-    base, tip = _ends_of(urdf, nominal, source)
-    origins = _origins(urdf.path_to(tip, base), nominal, calibrated)
-    return CorrectedUrdf(_edit(content, origins), len(origins), base, tip)
+    base, tip = _find_ends(urdf, nominal, source)
+    origins = _correct_origins(urdf.path_to(tip, base), nominal, calibrated)
+    return CorrectedUrdf(_replace_origins(content, origins), len(origins), base, tip)
 
 
-def nominal_chain(
-    urdf: Urdf, base: str, tip: str, source: str
-) -> tuple[UrdfChain, Chain]:
-    """The chain between two links, and the same as `mechanics` has it."""
-    found = chain_between(urdf, base, tip, (), source)
-    return found, parse_chain(found.notation, {}, source)
+def find_nominal_chain(urdf: Urdf, base: str, tip: str, source: str) -> Chain:
+    """Find the chain between two links of a URDF."""
+    return parse_chain(find_chain(urdf, base, tip, (), source).notation, {}, source)
 
 
-def _ends_of(urdf: Urdf, robot: Robot, source: str) -> tuple[str, str]:
-    """Base and tip between which the file has the robot's chain."""
-    wanted = robot.chain.end_effector.name
-    names = robot.joint_names
-    tips = [name for name in urdf.moments if point_name(name) == wanted]
+def _find_ends(urdf: Urdf, robot: Robot, source: str) -> tuple[str, str]:
+    """Find the base and the tip between which the file has the robot's chain."""
+    point = robot.chain.end_effector.name
+    tips = [link for link in urdf.moments if format_point_name(link) == point]
     if not tips:
-        raise InputError(
-            source,
-            "",
-            f"no link {wanted!r}, the robot's last measuring point",
-            _THE_SAME,
-        )
+        found = f"no link {point!r}, the robot's last measuring point"
+        raise InputError(source, "", found, _IMPORTED_URDF)
     for tip in tips:
         for joint in reversed(urdf.path_to(tip, None)):
-            try:
-                found, chain = nominal_chain(urdf, joint.parent, tip, source)
-            except InputError:
-                continue
-            if names in (
-                None,
-                (),
-                tuple(each.name for each in found.joints),
-            ) and _is_same(chain, robot.chain):
+            if _has_chain(urdf, joint.parent, tip, robot, source):
                 return joint.parent, tip
-    wanted_joints = ", ".join(names or ()) or format_count(robot.joints, "joint")
-    raise InputError(
-        source,
-        "",
-        f"no chain to {wanted!r} by {wanted_joints} as the robot file has it",
-        _THE_SAME,
+    joints = ", ".join(robot.joint_names or ()) or format_count(robot.joints, "joint")
+    found = f"no chain to {point!r} by {joints} as the robot file has it"
+    raise InputError(source, "", found, _IMPORTED_URDF)
+
+
+def _has_chain(urdf: Urdf, base: str, tip: str, robot: Robot, source: str) -> bool:
+    """Decide whether the chain between two links has the joint names, if the robot has
+    any, and the transforms of the robot."""
+    try:
+        urdf_chain = find_chain(urdf, base, tip, (), source)
+        chain = parse_chain(urdf_chain.notation, {}, source)
+    except InputError:
+        return False
+    joint_names = tuple(joint.name for joint in urdf_chain.joints)
+    if robot.joint_names and robot.joint_names != joint_names:
+        return False
+    links = _split_chain(chain)
+    robot_links = _split_chain(robot.chain)
+    return links.moving == robot_links.moving and bool(
+        np.abs(np.subtract(links.fixed, robot_links.fixed)).max() < _ROUNDING
     )
 
 
-def _is_same(chain: Chain, other: Chain) -> bool:
-    """Whether two chains move the same, joint by joint."""
-    (fixed, moving), (theirs, their_moving) = _stretches(chain), _stretches(other)
-    near = (
-        np.abs(mine - wanted).max() < _SAME
-        for mine, wanted in zip(fixed, theirs, strict=False)
-    )
-    return moving == their_moving and all(near)
-
-
-def _stretches(chain: Chain) -> tuple[list[np.ndarray], list[Transform]]:
-    """Fixed transforms (4, 4) before, between and behind those that move; and these."""
-    fixed = [np.eye(4)]
-    moving = []
+def _split_chain(chain: Chain) -> _RigidLinks:
+    links = _RigidLinks([], [np.eye(4)])
     for transform in chain.transforms:
         if transform.coordinate is None:
-            fixed[-1] = fixed[-1] @ elementary(
+            links.fixed[-1] = links.fixed[-1] @ make_elementary_transform(
                 transform.kind, transform.axis, transform.constant
             )
         else:
-            moving.append(transform)
-            fixed.append(np.eye(4))
-    return fixed, moving
+            links.moving.append(transform)
+            links.fixed.append(np.eye(4))
+    return links
 
 
-def _origins(
+def _correct_origins(
     path: list[Joint], nominal: Robot, calibrated: Robot
 ) -> dict[str, np.ndarray]:
-    """New origins (4, 4) by name of the joint, of those that differ."""
-    (before, moving), (after, _) = (
-        _stretches(nominal.chain),
-        _stretches(calibrated.chain),
-    )
-    # The URDF's joint values are the nominal angles: what the calibrated ones are where
-    # these are 0.
-    factor = calibrated.reported_matrix @ np.linalg.inv(nominal.reported_matrix)
-    offset = calibrated.reported_offset - factor @ nominal.reported_offset
-    found = {}
-    here = np.eye(4)
+    """Correct the origins (4, 4) of the joints of a path; return those that differ, by
+    the name of the joint."""
+    nominal_links = _split_chain(nominal.chain)
+    calibrated_fixed = _split_chain(calibrated.chain).fixed
+    offset = _offset_at_zero(nominal, calibrated)
+    origins = {}
+    frame = np.eye(4)
     number = 0
     for joint in path:
-        here = here @ joint.origin
+        frame = frame @ joint.origin
+        nominal_fixed = nominal_links.fixed[number]
         change = np.eye(4)
-        moves = joint.kind != "fixed"
-        error = np.linalg.inv(before[number]) @ after[number]
-        if moves:
-            transform = moving[number]
-            assert transform.coordinate is not None
-            to_chain = np.linalg.inv(here) @ before[number]
-            error = error @ elementary(
-                transform.kind,
-                transform.axis,
-                transform.sign * offset[transform.coordinate],
-            )
+        error = np.linalg.inv(nominal_fixed) @ calibrated_fixed[number]
+        if joint.kind != "fixed":
+            moving = nominal_links.moving[number]
+            assert moving.coordinate is not None
+            amount = moving.sign * offset[moving.coordinate]
+            error = error @ make_elementary_transform(moving.kind, moving.axis, amount)
+            to_chain = np.linalg.inv(frame) @ nominal_fixed
             change = to_chain @ error @ np.linalg.inv(to_chain)
-            number = number + 1
-            here = homogeneous(express_axis(joint.axis)[-1].T)
+            number += 1
+            frame = make_transform(express_axis(joint.axis).rotation.T)
         elif joint is path[-1]:
             change = error
         if np.abs(change - np.eye(4)).max() > 10.0**-_DECIMALS:
-            found[joint.name] = joint.origin @ change
-    return found
+            origins[joint.name] = joint.origin @ change
+    return origins
 
 
-def _edit(content: bytes, origins: Mapping[str, np.ndarray]) -> bytes:
-    """The file with other origins; comments inside of the robot stay."""
-    builder = Xml.TreeBuilder(insert_comments=True, insert_pis=True)
-    root = Xml.fromstring(content, Xml.XMLParser(target=builder))
+def _offset_at_zero(nominal: Robot, calibrated: Robot) -> np.ndarray:
+    """Angles of the calibrated robot at which those of the nominal robot are zero,
+    ndarray (n,): the joint values of the URDF are the nominal angles."""
+    factor = calibrated.reported_matrix @ np.linalg.inv(nominal.reported_matrix)
+    return calibrated.reported_offset - factor @ nominal.reported_offset
+
+
+def _replace_origins(content: bytes, origins: Mapping[str, np.ndarray]) -> bytes:
+    """Replace the origins of joints in a file; comments inside the robot stay."""
+    builder = ElementTree.TreeBuilder(insert_comments=True, insert_pis=True)
+    root = ElementTree.fromstring(content, ElementTree.XMLParser(target=builder))
     for joint in root.findall("{*}joint"):
-        if (transform := origins.get(joint.get("name", ""))) is not None:
-            origin = joint.find("{*}origin")
-            element = Xml.SubElement(joint, "origin") if origin is None else origin
-            turn = np.array(yaw_pitch_roll(transform[:3, :3]))[::-1]
-            for attribute, numbers in (("xyz", transform[:3, 3]), ("rpy", turn)):
-                element.set(
-                    attribute,
-                    " ".join(
-                        repr(round(float(number), _DECIMALS) + 0.0)
-                        for number in numbers
-                    ),
-                )
-    written: bytes = Xml.tostring(root, encoding="utf-8", xml_declaration=True)
-    return written + b"\n"
+        transform = origins.get(joint.get("name", ""))
+        if transform is None:
+            continue
+        origin = joint.find("{*}origin")
+        if origin is None:
+            origin = ElementTree.SubElement(joint, "origin")
+        roll_pitch_yaw = np.array(compute_yaw_pitch_roll(transform[:3, :3]))[::-1]
+        origin.set("xyz", _format_numbers(transform[:3, 3]))
+        origin.set("rpy", _format_numbers(roll_pitch_yaw))
+    xml: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+    return xml + b"\n"
+
+
+def _format_numbers(values: np.ndarray) -> str:
+    return " ".join(repr(round(float(value), _DECIMALS) + 0.0) for value in values)

@@ -27,12 +27,12 @@ from elastocal.figures.style import (
     styled,
 )
 from elastocal.report.words import (
-    candidate_words,
-    capital,
-    hypotheses_words,
-    in_words,
-    probability_words,
-    unit_of,
+    capitalize_first,
+    choose_length_unit,
+    format_candidate,
+    format_hypotheses,
+    format_probability,
+    spell_out_names,
 )
 from elastocal.verdict import MechanismSet, Probabilities
 
@@ -286,7 +286,7 @@ def _draw_scale_arrow(axis: Axes, scale: _ArrowScale) -> None:
     digit = 10.0 ** np.floor(np.log10(scale.largest_m))
     limit = scale.largest_m * (1 + 1e-9)
     shown_m = max(step for step in (1, 2, 5) if step * digit <= limit) * digit
-    factor, unit = unit_of(shown_m)
+    factor, unit = choose_length_unit(shown_m)
     # A quiver key needs a quiver; this one stays invisible.
     arrow = axis.quiver(
         [0],
@@ -332,7 +332,7 @@ def draw_before_after(
     figure, axes = create_panels(1, len(METRICS), height_mm, sharey=True)
     heights = 0.55 + 0.45 * np.array(line_counts)
     rows = np.cumsum(heights) - heights / 2
-    factor, unit = unit_of(_collect_errors(steps, "heldout").max())
+    factor, unit = choose_length_unit(_collect_errors(steps, "heldout").max())
     logarithmic_range = _find_logarithmic_range(steps, noise_floor_m)
     for axis, (metric, title) in zip(axes[0], METRICS.items(), strict=True):
         _draw_model_bars(axis, steps, metric, rows, factor)
@@ -375,7 +375,7 @@ def _find_logarithmic_range(
 def _label_model(step: str) -> str:
     """The effects of a model in words, in lines that fit next to the bars; the end of a
     long list is left out."""
-    effects = in_words(step).split(", ")
+    effects = spell_out_names(step).split(", ")
     return textwrap.fill(list_first(effects, _NAMED_EFFECTS), _MODEL_LABEL_WIDTH)
 
 
@@ -527,8 +527,8 @@ def draw_probabilities(
 def _list_hypotheses(sets: Sequence[MechanismSet]) -> list[tuple[str, float]]:
     """Label and probability of each hypothesis, then of all others together."""
     labels = [
-        textwrap.fill(capital(hypothesis), _HYPOTHESIS_LABEL_WIDTH)
-        for hypothesis in hypotheses_words(sets)
+        textwrap.fill(capitalize_first(hypothesis), _HYPOTHESIS_LABEL_WIDTH)
+        for hypothesis in format_hypotheses(sets)
     ]
     values = [hypothesis.probability for hypothesis in sets]
     hypotheses = [*zip(labels, values, strict=True)]
@@ -550,7 +550,7 @@ def _draw_hypotheses(
     axis.barh(rows, widths, height=0.62 * heights_mm, color=colours, zorder=2)
     for row, value in zip(rows, values, strict=True):
         axis.annotate(
-            probability_words(value),
+            format_probability(value),
             (100 * value, row),
             xytext=(3, 0),
             textcoords="offset points",
@@ -641,7 +641,7 @@ def rank_candidates(table: Mapping[str, np.ndarray]) -> np.ndarray:
 def shorten_candidate_name(key: str) -> str:
     """Word a candidate's key, in two lines if it is long; the middle of a very long name
     is left out."""
-    name = capital(candidate_words(key))
+    name = capitalize_first(format_candidate(key))
     if len(name) > _LONGEST_NAME:
         half = _LONGEST_NAME // 2
         name = f"{name[:half]} … {name[-(half - 2) :]}"

@@ -150,8 +150,8 @@ def choose_ink(colour: tuple[float, ...]) -> str:
 
     References
     ----------
-    [1] World Wide Web Consortium, Web Content Accessibility Guidelines 2.2, "relative
-    luminance" and "contrast ratio", 2023.
+    .. [1] World Wide Web Consortium, Web Content Accessibility Guidelines 2.2, "relative
+       luminance" and "contrast ratio", 2023.
     """
     linear = [
         value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4

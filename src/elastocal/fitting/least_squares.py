@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from scipy.special import gammaincinv
 
 from elastocal.campaigns.campaign import NO_ROTATION
-from elastocal.effects.conditions import at_states
+from elastocal.effects.conditions import select_conditions
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import (
     Estimate,
@@ -195,7 +195,11 @@ class Fit:
         """
         if self.conditions is None:
             return evaluate_conditions(self.model, self.estimate, states)
-        return self.conditions if chosen is None else at_states(self.conditions, chosen)
+        return (
+            self.conditions
+            if chosen is None
+            else select_conditions(self.conditions, chosen)
+        )
 
 
 def fit_model(

@@ -22,8 +22,8 @@ from scipy.sparse import csr_array
 from elastocal.effects.conditions import (
     MASS_PARAMETERS,
     Conditions,
-    with_springs,
-    with_total,
+    replace_springs,
+    replace_total_load,
 )
 from elastocal.fitting.model import (
     LOAD_EFFECTS,
@@ -505,7 +505,7 @@ def _step_each_compliance(
     compliances = get_joint_compliances(model, estimate)
     corrections = get_mass_corrections(model, estimate)
     for step in np.diag(steps):
-        yield None, with_springs(conditions, compliances + step, corrections)
+        yield None, replace_springs(conditions, compliances + step, corrections)
 
 
 def _step_each_mass_correction(
@@ -525,5 +525,5 @@ def _step_each_mass_correction(
         loaded = coordinates[: forces.shape[1]]
         for step, per_unit in zip(mass_steps, forces, strict=True):
             total[loaded] = present[loaded] + step * per_unit
-            yield {*loaded}, with_total(conditions, total.T)
+            yield {*loaded}, replace_total_load(conditions, total.T)
         total[loaded] = present[loaded]

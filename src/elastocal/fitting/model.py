@@ -12,9 +12,9 @@ from elastocal.campaigns.campaign import Campaign, assemble_campaign, build_meas
 from elastocal.effects.catalogue import candidates_on, declared_candidates
 from elastocal.effects.conditions import (
     MASS_PARAMETERS,
-    conditions_of,
-    offered,
-    with_springs,
+    build_conditions,
+    find_offered_needs,
+    replace_springs,
 )
 from elastocal.effects.elastic import joint_compliance
 from elastocal.effects.gravity import DECLARED_WEIGHT, declared_weight
@@ -120,7 +120,7 @@ class Model:
 
     def available_inputs(self, states: States) -> frozenset[str]:
         """Inputs of effects that states and campaign provide: see `Candidate.needs`."""
-        inputs = offered(self.sites, states)
+        inputs = find_offered_needs(self.sites, states)
         return inputs if self.fitted_frames else inputs | {"declared base"}
 
     def with_effects(self, effects: Iterable[Candidate]) -> Model:
@@ -331,7 +331,7 @@ def evaluate_conditions(
     Loads act at the displaced pose, which is found by fixed-point iteration unless
     displaced `coordinates` (S, C) are given.
     """
-    conditions = conditions_of(
+    conditions = build_conditions(
         model.sites,
         get_joint_compliances(model, estimate),
         states,
@@ -374,7 +374,7 @@ def update_springs_and_masses(
     model: Model, estimate: Estimate, conditions: Conditions
 ) -> Conditions:
     """Update conditions to the compliances and masses of an estimate."""
-    return with_springs(
+    return replace_springs(
         conditions,
         get_joint_compliances(model, estimate),
         get_mass_corrections(model, estimate),

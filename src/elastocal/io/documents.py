@@ -42,8 +42,8 @@ _NOT_XML = (
 class _UnclearError(yaml.MarkedYAMLError):
     """A text that people and YAML 1.1 read differently; `allowed` is allowed instead."""
 
-    def __init__(self, mark: Any, found: str, allowed: str) -> None:
-        super().__init__(problem=found, problem_mark=mark)
+    def __init__(self, mark: Any, finding: str, allowed: str) -> None:
+        super().__init__(problem=finding, problem_mark=mark)
         self.line = mark.line + 1
         self.allowed = allowed
 
@@ -270,14 +270,14 @@ def check_document(document: Any, schema: str, source: str) -> None:
 
 
 def _refusal(
-    source: str, path: Sequence[str | int], found: str, allowed: str
+    source: str, path: Sequence[str | int], finding: str, allowed: str
 ) -> InputError:
     """Return an error at a key, with its line if the file has it."""
     key = "".join(
-        f"[{part}]" if isinstance(part, int) else f".{part}" for part in path
+        f"[{entry}]" if isinstance(entry, int) else f".{entry}" for entry in path
     ).lstrip(".")
-    place = ", ".join(filter(None, (_line_of(source, path), key)))
-    return InputError(source, place, found, allowed)
+    location = ", ".join(filter(None, (_find_line(source, path), key)))
+    return InputError(source, location, finding, allowed)
 
 
 def _iterate_texts(
@@ -296,7 +296,7 @@ def _iterate_texts(
             yield from _iterate_texts(entry, (*path, index))
 
 
-def _line_of(source: str, path: Sequence[str | int]) -> str:
+def _find_line(source: str, path: Sequence[str | int]) -> str:
     """Return the line of the file at which a key is, or else the entry that should
     contain it; empty if the file has neither."""
     try:
@@ -304,23 +304,23 @@ def _line_of(source: str, path: Sequence[str | int]) -> str:
     except (InputError, yaml.YAMLError):
         return ""
     line = ""
-    for part in path:
-        marked_node, node = _find_entry(node, part)
+    for entry in path:
+        marked_node, node = _find_entry(node, entry)
         if marked_node is None:
             break
         line = f"line {marked_node.start_mark.line + 1}"
     return line
 
 
-def _find_entry(node: Any, part: str | int) -> tuple[Any, Any]:
+def _find_entry(node: Any, entry: str | int) -> tuple[Any, Any]:
     """Return the node at which an entry begins, and the node of its value; None if there
     is none."""
-    if isinstance(node, yaml.SequenceNode) and isinstance(part, int):
-        if part < len(node.value):
-            return node.value[part], node.value[part]
+    if isinstance(node, yaml.SequenceNode) and isinstance(entry, int):
+        if entry < len(node.value):
+            return node.value[entry], node.value[entry]
     elif isinstance(node, yaml.MappingNode):
         for key, value in node.value:
-            if key.value == str(part):
+            if key.value == str(entry):
                 return key, value
     return None, None
 
@@ -330,9 +330,9 @@ def _explain(error: Any) -> tuple[list[str | int], str, str]:
     path = [*error.absolute_path]
     schema = error.schema
     if error.validator == "additionalProperties":
-        known = sorted(schema.get("properties", {}))
-        unknown = next(name for name in error.instance if name not in known)
-        allowed = f"{suggest_name(unknown, known)} ({', '.join(known)})".strip()
+        keys = sorted(schema.get("properties", {}))
+        unknown = next(name for name in error.instance if name not in keys)
+        allowed = f"{suggest_name(unknown, keys)} ({', '.join(keys)})".strip()
         return [*path, unknown], "an unknown key", allowed
     if error.validator == "required":
         missing = next(
@@ -366,12 +366,12 @@ _RULES = {
 
 def _describe_schema(schema: Mapping[str, Any]) -> str:
     """Return in words what a schema allows, with its description in brackets."""
-    parts = [_describe_type(schema)]
-    parts += [_describe_range(schema, *names) for names in _RANGES]
-    parts += [
-        words.format(schema[rule]) for rule, words in _RULES.items() if rule in schema
+    phrases = [_describe_type(schema)]
+    phrases += [_describe_range(schema, *names) for names in _RANGES]
+    phrases += [
+        phrase.format(schema[rule]) for rule, phrase in _RULES.items() if rule in schema
     ]
-    text = ", ".join(filter(None, parts))
+    text = ", ".join(filter(None, phrases))
     if "description" in schema:
         text += f" ({schema['description']})"
     return text
@@ -402,7 +402,7 @@ def _describe_range(
     return f"{lower}{unit}" if lower == upper else f"{lower} to {upper}{unit}"
 
 
-def document_path(folder: str | Path, kind: str, name: str) -> str:
+def locate_document(folder: str | Path, kind: str, name: str) -> str:
     """Return the path of a document that a configuration names:
     ``folder/kind/name.yaml``."""
     return (Path(folder) / kind / f"{name}.yaml").as_posix()
@@ -421,13 +421,13 @@ def read_named_document(
     source : file of the configuration, for messages.
     """
     files = Path(folder, kind).glob("*.yaml")
-    known = sorted(file.stem for file in files if file.is_file())
+    names = sorted(file.stem for file in files if file.is_file())
     # Accept a name only, because a path might lead out of the folder.
-    if name not in known:
-        listed = suggest_names(name, known)
+    if name not in names:
+        listed = suggest_names(name, names)
         allowed = f"a file of {Path(folder, kind).as_posix()}: {listed}"
         raise InputError(source, kind, repr(name), allowed)
-    path = document_path(folder, kind, name)
+    path = locate_document(folder, kind, name)
     document: dict[str, Any] = read_document(path)
     check_document(document, schema, path)
     return document

@@ -17,6 +17,5 @@ def read_json(path: str | Path) -> Any:
 
 
 def write_json(path: str | Path, contents: Any, **options: Any) -> None:
-    """Write a JSON file that people can read too, atomically, with options of
-    ``json.dumps``."""
+    """Write an indented JSON file atomically; options are passed to ``json.dumps``."""
     write_text(path, json.dumps(contents, indent=1, **options) + "\n")

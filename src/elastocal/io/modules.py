@@ -1,4 +1,4 @@
-"""Find the modules of a package, so that a catalogue has each without a list."""
+"""List the modules of a package, so that a new module enters a catalogue by itself."""
 
 import pkgutil
 from types import ModuleType

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from elastocal import __version__
-from elastocal.io.plugins import plugin_versions
+from elastocal.io.plugins import list_plugin_versions
 
 # Parameters of rules that are no configuration: with one Snakemake notices edited
 # sources, the other is the function that a job calls.
@@ -57,17 +57,17 @@ def format_canonical_json(value: Any) -> str:
     )
 
 
-def configuration_sha256(configuration: Any) -> str:
+def digest_configuration(configuration: Any) -> str:
     """Return the SHA-256 of the canonical JSON of a configuration, which must include
     everything that it refers to, such as the documents of robots."""
     return hashlib.sha256(format_canonical_json(configuration).encode()).hexdigest()
 
 
-def environment(folder: str | Path) -> dict[str, str]:
+def list_versions(folder: str | Path) -> dict[str, str]:
     """Return the versions of the installed libraries and of packages with plug-ins, and
     the SHA-256 of the pins in the folder of the Snakefile if it has some."""
     lock = Path(folder, _LOCK)
-    versions = {name: version(name) for name in _LIBRARIES} | plugin_versions()
+    versions = {name: version(name) for name in _LIBRARIES} | list_plugin_versions()
     if lock.is_file():
         versions[_LOCK] = hashlib.sha256(lock.read_bytes()).hexdigest()
     return versions

@@ -59,13 +59,13 @@ def load_plugins(
     return plugins
 
 
-def plugin_names(group: str) -> list[str]:
-    """Names that installed packages offer in one group, without loading any."""
+def list_plugin_names(group: str) -> list[str]:
+    """List the names that installed packages offer in one group, without an import."""
     return sorted(entry.name for entry in entry_points(group=group))
 
 
-def plugin_versions() -> dict[str, str]:
-    """Versions of the installed packages that offer plug-ins, by package name."""
+def list_plugin_versions() -> dict[str, str]:
+    """List the versions of the installed packages that offer plug-ins, by their names."""
     distributions = [
         entry.dist for group in GROUPS for entry in entry_points(group=group)
     ]
@@ -93,8 +93,8 @@ def _load_plugin(entry: EntryPoint, kind: type[Plugin]) -> Plugin:
     return plugin
 
 
-def _plugin_error(entry: EntryPoint, found: str, allowed: str) -> InputError:
+def _plugin_error(entry: EntryPoint, finding: str, allowed: str) -> InputError:
     package = entry.dist.name if entry.dist is not None else entry.module
     return InputError(
-        f"package {package}", f"{entry.group} {entry.name}", found, allowed
+        f"package {package}", f"{entry.group} {entry.name}", finding, allowed
     )

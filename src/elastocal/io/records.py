@@ -14,13 +14,12 @@ from pathlib import Path
 
 from elastocal.errors import InputError
 from elastocal.io.json_files import read_json, write_json
-from elastocal.io.origin import Origin, configuration_sha256
+from elastocal.io.origin import Origin, digest_configuration
 from elastocal.io.texts import check_file
 
 RECORDS = Path("results/records")
 # Folders in which the pipeline makes files. All other files are the user's.
 _PIPELINE_FOLDERS = ("data", "results", "reports")
-_AS_WRITTEN = "the file as the pipeline wrote it (delete {} and run the pipeline again)"
 # Keys of a record: digests of its output, and the digest of the record itself.
 _FILES = "files"
 _DIGEST = "sha256"
@@ -39,7 +38,7 @@ class JobRecord:
     own : inputs of the user, which no job made and which may have moved since.
     outputs : paths of what the job made.
     origin : commit, configuration and seed.
-    environment : as of `origin.environment`.
+    environment : as `origin.list_versions` returns it.
     """
 
     rule: str
@@ -60,31 +59,30 @@ class JobRecord:
     @property
     def made_inputs(self) -> dict[str, str]:
         """Inputs that other jobs made."""
-        return {
-            file: digest
-            for file, digest in self.inputs.items()
-            if _is_made(file) and file not in self.own
-        }
+        return self._select_inputs(made=True)
 
     @property
     def sources(self) -> dict[str, str]:
         """Inputs that come with the program or its configuration: modules, scripts,
         robots."""
+        return self._select_inputs(made=False)
+
+    def _select_inputs(self, *, made: bool) -> dict[str, str]:
         return {
             file: digest
             for file, digest in self.inputs.items()
-            if not _is_made(file) and file not in self.own
+            if _is_made(file) == made and file not in self.own
         }
 
 
 def write_records(job: JobRecord) -> None:
-    """Write the record of each output in the pipeline's folders; that of an output
-    folder has all of its files."""
+    """Write the record of each output in the pipeline's folders; the record of an output
+    folder has the digests of all files in it."""
     for output in filter(_is_made, job.outputs):
         path = locate_record(output)
         path.parent.mkdir(parents=True, exist_ok=True)
-        record = asdict(job) | {_FILES: _file_digests(output)}
-        write_json(path, record | {_DIGEST: configuration_sha256(record)})
+        record = asdict(job) | {_FILES: _digest_files(output)}
+        write_json(path, record | {_DIGEST: digest_configuration(record)})
 
 
 def read_record(path: str, within: str | Path = "") -> tuple[JobRecord, dict[str, str]]:
@@ -105,10 +103,10 @@ def read_record(path: str, within: str | Path = "") -> tuple[JobRecord, dict[str
     record_path = locate_record(path, within)
     if not record_path.is_file():
         finding = f"no record of the job that made it, {record_path}"
-        raise InputError(Path(within, path), "", finding, _AS_WRITTEN.format("it"))
+        raise _refusal(Path(within, path), finding)
     try:
         record = read_json(record_path)
-        if record.pop(_DIGEST) != configuration_sha256(record):
+        if record.pop(_DIGEST) != digest_configuration(record):
             raise ValueError("other contents than were written")
         files: dict[str, str] = record.pop(_FILES)
         record["own"] = tuple(record["own"])
@@ -116,26 +114,28 @@ def read_record(path: str, within: str | Path = "") -> tuple[JobRecord, dict[str
         record["origin"] = Origin(**record["origin"])
         return JobRecord(**record), files
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(
-            record_path,
-            "",
-            f"no record of a job ({error})",
-            f"of {path} {_AS_WRITTEN.format('it')}",
-        ) from None
+        finding = f"no record of a job ({error})"
+        raise _refusal(record_path, finding, f"it and {path}") from None
+
+
+def _refusal(path: Path, finding: str, outputs: str = "it") -> InputError:
+    """Return the error of a file that is not as its job wrote it; `outputs` are what the
+    user must delete so that they are made again."""
+    allowed = f"the file as the pipeline wrote it (delete {outputs} and run the pipeline again)"
+    return InputError(path, "", finding, allowed)
 
 
 def list_recorded_files(within: str | Path = "") -> dict[str, str]:
     """Return the SHA-256 of every file that has a record, by its path."""
     top = Path(within, RECORDS)
-    names = sorted(
-        file.relative_to(top).as_posix().removesuffix(".json")
-        for file in top.rglob("*.json")
+    outputs = sorted(
+        record.relative_to(top).as_posix().removesuffix(".json")
+        for record in top.rglob("*.json")
     )
-    return {
-        file: digest
-        for name in names
-        for file, digest in read_record(name, within)[1].items()
-    }
+    digests: dict[str, str] = {}
+    for output in outputs:
+        digests |= read_record(output, within)[1]
+    return digests
 
 
 def locate_record(path: str, within: str | Path = "") -> Path:
@@ -161,16 +161,16 @@ def digest_inputs(
         job wrote it.
     """
     digests = {}
-    own = []
+    users_inputs = []
     for path in map(str, paths):
         is_checked = checked is None or path in checked
         if is_checked and _is_made(path):
             digests[path] = _check_output(path)[1]
         else:
-            digests[path] = _joint_digest(_file_digests(path))
+            digests[path] = _combine_digests(_digest_files(path))
         if not is_checked and not locate_record(path).is_file():
-            own.append(path)
-    return digests, tuple(own)
+            users_inputs.append(path)
+    return digests, tuple(users_inputs)
 
 
 def trace_jobs(targets: Iterable[str], within: str | Path = "") -> list[JobRecord]:
@@ -192,12 +192,7 @@ def trace_jobs(targets: Iterable[str], within: str | Path = "") -> list[JobRecor
     for job in jobs.values():
         for path, digest in job.made_inputs.items():
             if digests[path] != digest:
-                raise InputError(
-                    Path(within, path),
-                    "",
-                    f"not what {job.name} read",
-                    _AS_WRITTEN.format("it"),
-                )
+                raise _refusal(Path(within, path), f"not what {job.name} read")
     return [job for _, job in sorted(jobs.items())]
 
 
@@ -208,9 +203,8 @@ def check_sources(jobs: Iterable[JobRecord], within: str | Path, allowed: str) -
         for file, digest in job.sources.items():
             path = Path(within, file)
             if not path.is_file() or compute_sha256(path) != digest:
-                raise InputError(
-                    path, "", f"not what {job.name} was made with", allowed
-                )
+                finding = f"not what {job.name} was made with"
+                raise InputError(path, "", finding, allowed)
 
 
 def compute_sha256(path: str | Path) -> str:
@@ -220,20 +214,17 @@ def compute_sha256(path: str | Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _file_digests(path: str, within: str | Path = "") -> dict[str, str]:
+def _digest_files(path: str, within: str | Path = "") -> dict[str, str]:
     """Return the SHA-256 of a file, or of all files below a folder. Hidden files are
     left out, because Snakemake writes the time to one."""
+    names = [path]
     folder = Path(within, path)
-    files = [
-        file
-        for file in folder.rglob("*")
-        if file.is_file() and not file.name.startswith(".")
-    ]
-    names = (
-        sorted(file.relative_to(within).as_posix() for file in files)
-        if folder.is_dir()
-        else [path]
-    )
+    if folder.is_dir():
+        names = sorted(
+            file.relative_to(within).as_posix()
+            for file in folder.rglob("*")
+            if file.is_file() and not file.name.startswith(".")
+        )
     return {name: compute_sha256(Path(within, name)) for name in names}
 
 
@@ -241,20 +232,18 @@ def _check_output(path: str, within: str | Path = "") -> tuple[JobRecord, str]:
     """Return the job that made a file or folder, and the digest; refuse a file that is
     not as the job wrote it."""
     job, written = read_record(path, within)
-    present = _file_digests(path, within) if Path(within, path).exists() else {}
+    present = _digest_files(path, within) if Path(within, path).exists() else {}
     for file in sorted(written.keys() | present.keys()):
         if written.get(file) != present.get(file):
-            what = "other contents than were written" if file in present else "nothing"
-            raise InputError(
-                Path(within, file),
-                "",
-                what,
-                _AS_WRITTEN.format("it" if file == path else path),
-            )
-    return job, _joint_digest(written)
+            finding = "nothing"
+            if file in present:
+                finding = "other contents than were written"
+            output = "it" if file == path else path
+            raise _refusal(Path(within, file), finding, output)
+    return job, _combine_digests(written)
 
 
-def _joint_digest(files: Mapping[str, str]) -> str:
+def _combine_digests(files: Mapping[str, str]) -> str:
     """Return the SHA-256 of a single file, or that of the list of several files."""
     if len(files) == 1:
         return next(iter(files.values()))
@@ -268,9 +257,9 @@ def _format_list(files: Mapping[str, str]) -> list[str]:
 
 def _is_made(path: str) -> bool:
     """Return whether the pipeline makes the file."""
-    return (
-        Path(path).parts[:1] in [(name,) for name in _PIPELINE_FOLDERS]
-        and ".." not in Path(path).parts
+    folders = Path(path).parts
+    return folders[:1] in [(name,) for name in _PIPELINE_FOLDERS] and (
+        ".." not in folders
     )
 
 

@@ -58,21 +58,22 @@ def read_bytes(
         device, which might never end.
     """
     try:
-        if check_file(path, kind) <= largest:
+        size = check_file(path, kind)
+        if size <= largest:
             with open(path, "rb") as file:
+                # A file may grow while it is read.
                 content = file.read(largest + 1)
             if len(content) <= largest:
                 return content
-        raise InputError(
-            path, "", f"more than {largest} bytes", f"{kind} of at most {largest} bytes"
-        )
+    except InputError:
+        raise
     except OSError as error:
         raise InputError(path, "", describe_os_error(error), kind) from None
     except ValueError as error:
-        # The path has a null character. An InputError is a ValueError, too.
-        if isinstance(error, InputError):
-            raise
+        # The path has a null character.
         raise InputError(path, "", str(error), kind) from None
+    finding = f"more than {largest} bytes"
+    raise InputError(path, "", finding, f"{kind} of at most {largest} bytes")
 
 
 def read_text(
@@ -101,8 +102,8 @@ def decode_text(content: bytes, path: str | Path, encoding: str = "utf-8-sig") -
 
 
 def parse_number(text: str, largest: float = LARGEST_NUMBER) -> float | None:
-    """Return the decimal number that a text is; None for words, NaN, digits with
-    underscores, and a number of more than the largest size."""
+    """Return the decimal number that a text states; None for words, NaN, digits with
+    underscores, and a number beyond the largest size."""
     if len(text) > _LONGEST_NUMBER or not _NUMBER.fullmatch(text):
         return None
     value = float(text)

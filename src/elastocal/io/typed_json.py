@@ -76,7 +76,7 @@ def from_document(
     return instance
 
 
-def json_schema(cls: type) -> dict[str, Any]:
+def build_json_schema(cls: type) -> dict[str, Any]:
     """Return the JSON schema of a dataclass, with one definition for each class."""
     definitions: dict[str, Any] = {}
     reference = _schema_of(cls, definitions)

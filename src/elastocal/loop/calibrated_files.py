@@ -1,6 +1,5 @@
-"""A campaign that was diagnosed, from the files of its diagnosis: its calibrated robot,
-without a fit of its model, and the contents of its certificate, how good the robot is,
-against what, and how sure that is."""
+"""Load a diagnosed campaign from its files, restore its calibrated robot without a fit,
+and build the contents of its certificate."""
 
 from __future__ import annotations
 
@@ -32,10 +31,14 @@ from elastocal.diagnosis.misplaced import describe_reference_point
 from elastocal.errors import InputError
 from elastocal.fitting.noise import parse_noise
 from elastocal.io.json_files import read_json
-from elastocal.io.origin import configuration_sha256
+from elastocal.io.origin import digest_configuration
 from elastocal.io.records import check_sources, trace_jobs
 from elastocal.io.typed_json import to_document
-from elastocal.loop.diagnosis_tables import load_case, rows_left_out, step_model
+from elastocal.loop.diagnosis_tables import (
+    find_rejected_rows,
+    load_case,
+    restore_step_model,
+)
 from elastocal.residual_model.selection import fit_to_observations
 from elastocal.validation.conformity import (
     PASS,
@@ -57,7 +60,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Diagnosed:
+class DiagnosedCampaign:
     """A campaign with the results of its diagnosis.
 
     Attributes
@@ -92,7 +95,7 @@ class Diagnosed:
         """The robot of the final model, with errors as large as the validation poses
         show them."""
         step = self.facts["steps"][-1]
-        model, estimate = step_model(self.case, step)
+        model, estimate = restore_step_model(self.case, step)
         regression = None
         remainder = self.verdict.remainder
         if remainder and remainder.regression and remainder.spread:
@@ -120,8 +123,8 @@ class Diagnosed:
             robot, self.verdict.other_models_m or 0.0, contradicted=False
         )
 
-    def by_physics(self) -> Diagnosed:
-        """Return the same campaign as if no regression had been asked for."""
+    def without_regression(self) -> DiagnosedCampaign:
+        """Return the same campaign without the regression on the residual."""
         verdict = replace(
             self.verdict,
             remainder=None,
@@ -139,7 +142,7 @@ class Diagnosed:
 
 def load_diagnosed(
     folder: str | Path, robots_folder: str | Path, top: str | Path
-) -> Diagnosed:
+) -> DiagnosedCampaign:
     """Load a campaign and its diagnosis, if neither has changed since.
 
     Parameters
@@ -183,9 +186,9 @@ def load_diagnosed(
         )
     facts = read_json(tables / "diagnosis.json")
     case = load_case(tables / "campaign.json", tables / "training.parquet")
-    return Diagnosed(
+    return DiagnosedCampaign(
         campaign_folder,
-        case.select(~rows_left_out(case, facts)),
+        case.select(~find_rejected_rows(case, facts)),
         facts,
         read_verdict(verdict_path),
         _describe_origin(jobs, data),
@@ -211,8 +214,8 @@ def _describe_origin(
         environment[name] = _join_distinct(versions)
     return {
         "commit": _join_distinct(job.origin.commit for job in jobs),
-        "code_sha256": configuration_sha256(sources),
-        "data_sha256": configuration_sha256(sorted(data)),
+        "code_sha256": digest_configuration(sources),
+        "data_sha256": digest_configuration(sorted(data)),
         "environment": environment,
     }
 
@@ -221,16 +224,17 @@ def _join_distinct(values: Iterable[str]) -> str:
     return ", ".join(sorted(set(values)))
 
 
-def certificate(
-    campaign: Diagnosed, tolerance_m: float, accepted_risk: float
+def build_certificate(
+    campaign: DiagnosedCampaign, tolerance_m: float, accepted_risk: float
 ) -> dict[str, Any]:
     """Return the contents of a certificate.
 
-    All of the corrected robot is predicted, at the poses and loads of the campaign.
+    Every error of the corrected robot is predicted, at the poses and loads of the
+    campaign.
 
     Parameters
     ----------
-    campaign : Diagnosed
+    campaign : DiagnosedCampaign
         The campaign with its diagnosis.
     tolerance_m : float
         Largest allowed RMS position error, m.
@@ -256,11 +260,11 @@ def certificate(
     if not accuracy.fitted:
         missing.insert(
             0,
-            "nothing fitted: no error of 0 is predicted of a robot of which nothing was fitted",
+            "nothing fitted: no error is predicted for a robot without fitted parameters",
         )
     if missing and decision.decision == PASS:
         decision = replace(decision, decision=UNDECIDED)
-    budget = error_budget(calibrated, *commands)
+    budget = compute_error_budget(calibrated, *commands)
     return {
         "campaign": campaign.name,
         "robot": robot.name,
@@ -310,31 +314,40 @@ def _describe_worst_pose(
     return {"joints": joints, "error_m": float(error_m[worst])}
 
 
-def error_budget(
+def compute_error_budget(
     calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray
 ) -> dict[str, float]:
-    """Error budget of a robot over commands (N, n) under loads (N, 6), m, RMS.
+    """Compute the error budget of a robot over commands, RMS, m.
 
-    What is missed without any correction; each effect by its name in the catalogue, or
-    ``joint_compliance``, if it alone were left out, largest first; what a correction
-    leaves, by `accuracy.predict_errors`. Only the last add up: effects may work against
-    each other, and loads meet springs.
+    The entries are: the error without any correction; each effect, by its name in the
+    catalogue or ``joint_compliance``, if it alone were left out of the correction,
+    largest first; and the errors that the correction leaves, by
+    `accuracy.predict_errors`. Only the squares of the last group add up, because effects
+    may work against each other and loads interact with compliances.
+
+    Parameters
+    ----------
+    calibrated : CalibratedRobot
+        The robot.
+    reported_angles : ndarray
+        Joint angles (N, n) as the controller reports them, rad.
+    wrench : ndarray
+        Loads (N, 6), N and N m.
     """
-    costs = compute_effect_contributions(calibrated, reported_angles, wrench)
-    rest = predict_errors(calibrated, reported_angles, wrench, draws=0)
-    ends = {
-        "left by the regression": root_mean_square(rest.regression_m),
-        "form of the model": root_mean_square(rest.form_m),
-        "not commanded": rest.scope.left_out_m,
+    contributions = compute_effect_contributions(calibrated, reported_angles, wrench)
+    by_size = sorted(contributions, key=contributions.__getitem__, reverse=True)
+    remaining = predict_errors(calibrated, reported_angles, wrench, draws=0)
+    budget = {
+        "uncorrected": compute_uncorrected_rms_m(calibrated, reported_angles, wrench)
     }
-    return {
-        "uncorrected": compute_uncorrected_rms_m(calibrated, reported_angles, wrench),
-        **{
-            name: costs[name]
-            for name in sorted(costs, key=costs.__getitem__, reverse=True)
-            if costs[name] > 0.0
-        },
-        "uncertainty of the parameters": root_mean_square(rest.parameters_m),
-        "repeatability": root_mean_square(rest.repeated_m),
-        **{name: end for name, end in ends.items() if end},
+    for name in by_size:
+        if contributions[name] > 0.0:
+            budget[name] = contributions[name]
+    budget["uncertainty of the parameters"] = root_mean_square(remaining.parameters_m)
+    budget["repeatability"] = root_mean_square(remaining.repeated_m)
+    optional = {
+        "left by the regression": root_mean_square(remaining.regression_m),
+        "form of the model": root_mean_square(remaining.form_m),
+        "not commanded": remaining.scope.left_out_m,
     }
+    return budget | {name: rms_m for name, rms_m in optional.items() if rms_m}

@@ -1,4 +1,5 @@
-"""A diagnosis as files, and back: the only writer and the only reader of its tables."""
+"""Write a diagnosis to files and restore it from them: this module alone knows the
+layout of diagnosis.json, of the steps table and of candidates.csv."""
 
 from __future__ import annotations
 
@@ -20,13 +21,13 @@ from elastocal.io.json_files import read_json, write_json
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import read_table, write_table
 from elastocal.io.typed_json import from_document
-from elastocal.loop.schemas import STEPS, measurements
+from elastocal.loop.schemas import STEPS, build_measurements_schema
 from elastocal.mechanics.robot_file import parse_robot
 from elastocal.random_streams import open_stream
 from elastocal.verdict import TrainingVerdict
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterator, Mapping
     from pathlib import Path
 
     from elastocal.diagnosis.verdict import Evidence
@@ -34,15 +35,16 @@ if TYPE_CHECKING:
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case, Model
 
-
-# Parts of an estimate in diagnosis.json: arrays, and an array for each effect.
+# Fields of an estimate in diagnosis.json: single arrays, and tuples with one array for
+# each effect.
 _PLACEMENTS = ("frame_rotation", "frame_position", "target_offset", "target_rotation")
-_OF_EFFECTS = ("coefficients", "shapes")
+_EFFECT_PARAMETERS = ("coefficients", "shapes")
 
 
 def diagnose_campaign(job: Any) -> None:
-    """The step of a rule: what the training poses say, and the next experiment."""
-    # Who reads the tables of a diagnosis starts without pandas.
+    """Diagnose the training poses and propose the next experiment. Called by a rule of
+    the workflow."""
+    # Import pandas only here, because restoring a diagnosis does not need it.
     import pandas as pd
 
     from elastocal.io.data_frames import write_csv
@@ -50,28 +52,30 @@ def diagnose_campaign(job: Any) -> None:
     case = load_case(job.input.descriptions, job.input.training)
     name = job.wildcards.campaign
     seed = job.params.seed
-    found = diagnose(
+    diagnosis = diagnose(
         case,
         Settings(),
         seed,
         lambda line: print(f"{name}: {line}", file=sys.stderr, flush=True),
     )
-    columns, proposal = propose_experiment(
-        found,
+    experiment, proposal = propose_experiment(
+        diagnosis,
         open_stream(seed, case.campaign.name, "next experiment", 0),
         job.params.states,
     )
-    write_csv(job.output.experiment, pd.DataFrame(columns))
-    found = replace(found, verdict=replace(found.verdict, next_experiment=proposal))
-    write_csv(job.output.candidates, pd.DataFrame(candidate_rows(found)))
+    verdict = replace(diagnosis.verdict, next_experiment=proposal)
+    diagnosis = replace(diagnosis, verdict=verdict)
+    write_csv(job.output.experiment, pd.DataFrame(experiment))
+    write_csv(job.output.candidates, pd.DataFrame(tabulate_candidates(diagnosis)))
+    covariance = diagnosis.final.covariance.tolist()
     write_json(
         job.output.diagnosis,
-        diagnosis_facts(found) | {"covariance": found.final.covariance.tolist()},
+        serialize_diagnosis(diagnosis) | {"covariance": covariance},
     )
     write_table(
         job.output.steps,
         STEPS,
-        step_blocks(found),
+        generate_step_blocks(diagnosis),
         describe_provenance(job.params, **job.wildcards),
     )
 
@@ -79,43 +83,57 @@ def diagnose_campaign(job: Any) -> None:
 def load_case(
     descriptions_path: str | Path,
     measurements_path: str | Path,
-    part: str | None = None,
+    validation_key: str | None = None,
 ) -> Case:
-    """A campaign from the files of step 1; `part` is the campaign that holds the test,
-    where it is another one."""
+    """Load a campaign from the files that step 1 has written.
+
+    Parameters
+    ----------
+    descriptions_path : str or path
+        campaign.json.
+    measurements_path : str or path
+        Table of training or held-out measurements.
+    validation_key : str, optional
+        Key of campaign.json with the campaign that validates this one. If it has none,
+        the measurements belong to the campaign itself.
+    """
     descriptions = read_json(descriptions_path)
-    described = (part and descriptions[part]) or descriptions
+    described = descriptions
+    if validation_key is not None and descriptions[validation_key]:
+        described = descriptions[validation_key]
     joints = parse_robot(described["robot"], described["source"]).joints
-    return build_case(described, read_table(measurements_path, measurements(joints)))
+    schema = build_measurements_schema(joints)
+    return build_case(described, read_table(measurements_path, schema))
 
 
-def step_blocks(diagnosis: Diagnosis) -> Iterator[dict[str, np.ndarray | list[str]]]:
-    """Blocks of the steps table."""
+def generate_step_blocks(
+    diagnosis: Diagnosis,
+) -> Iterator[dict[str, np.ndarray | list[str]]]:
+    """Generate the blocks of the steps table, one for each model."""
     for number, step in enumerate(diagnosis.steps):
         yield {
             "step": np.full(len(step.fitted.unidentifiable), number),
-            **parameter_columns(step.fitted),
+            **tabulate_parameters(step.fitted),
         }
 
 
-def diagnosis_facts(diagnosis: Diagnosis) -> dict[str, Any]:
-    """What diagnosis.json holds: of each step its model, with the priors under which it
-    was fitted, and its estimate."""
+def serialize_diagnosis(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return the contents of diagnosis.json: the training verdict, and for each step its
+    model, its estimate and the priors under which it was fitted."""
     return {
         "document": diagnosis.document,
-        "steps": [_step_facts(step) for step in diagnosis.steps],
+        "steps": [_serialize_step(step) for step in diagnosis.steps],
     }
 
 
-def _step_facts(step: Step) -> dict[str, Any]:
-    """Return model, priors and estimate of a step, as diagnosis.json has them."""
+def _serialize_step(step: Step) -> dict[str, Any]:
     effects = step.fitted.model.effects
     estimate = step.fitted.estimate
     stated: dict[str, Any] = {"sessions": [int(entry) for entry in estimate.sessions]}
     for name in _PLACEMENTS:
         stated[name] = getattr(estimate, name).tolist()
-    for name in _OF_EFFECTS:
-        stated[name] = _list_arrays(getattr(estimate, name))
+    for name in _EFFECT_PARAMETERS:
+        stated[name] = [values.tolist() for values in getattr(estimate, name)]
     return {
         "name": step.name,
         "kind": step.kind,
@@ -126,70 +144,75 @@ def _step_facts(step: Step) -> dict[str, Any]:
     }
 
 
-def _list_arrays(arrays: Iterable[np.ndarray]) -> list[list[float]]:
-    return [values.tolist() for values in arrays]
-
-
 def _list_priors(effect: Candidate) -> list[float | None]:
     return [parameter.prior_std for parameter in effect.parameters]
 
 
-def final_parameters(
+def select_final_parameters(
     facts: Mapping[str, Any], columns: Mapping[str, np.ndarray]
 ) -> dict[str, np.ndarray]:
-    """Parameters of the final model, (N,): `columns` of the steps table, of the last
-    step of diagnosis.json, `facts`."""
-    return {
-        name: values[columns["step"] == len(facts["steps"]) - 1]
-        for name, values in columns.items()
-    }
+    """Select the parameters of the final model.
+
+    Parameters
+    ----------
+    facts : mapping
+        Contents of diagnosis.json.
+    columns : mapping of (N,) arrays
+        Columns of the steps table.
+    """
+    is_final = columns["step"] == len(facts["steps"]) - 1
+    return {name: values[is_final] for name, values in columns.items()}
 
 
-def diagnosis_from(case: Case, facts: Mapping[str, Any]) -> Diagnosis:
-    """A diagnosis from diagnosis.json, `facts`; without the evidence, which only
-    training poses have.
+def restore_diagnosis(case: Case, facts: Mapping[str, Any]) -> Diagnosis:
+    """Restore a diagnosis from its file, without the evidence, which is not stored.
 
-    `case`: of the training poses.
+    Parameters
+    ----------
+    case : Case
+        All training poses.
+    facts : mapping
+        Contents of diagnosis.json.
     """
     measurements = case.campaign.measurements
-    left_out = rows_left_out(case, facts)
-    case = case.select(~left_out)
+    is_rejected = find_rejected_rows(case, facts)
+    kept_case = case.select(~is_rejected)
     steps = tuple(
-        Step(step["name"], step["kind"], step_fit(case, step))
+        Step(step["name"], step["kind"], refit_step(kept_case, step))
         for step in facts["steps"]
     )
+    document = facts["document"]
     return Diagnosis(
-        case,
+        kept_case,
         steps,
         None,
-        from_document(TrainingVerdict, facts["document"], "diagnosis.json"),
-        measurements.select(left_out),
-        Settings.from_document(facts["document"]["settings"]),
+        from_document(TrainingVerdict, document, "diagnosis.json"),
+        measurements.select(is_rejected),
+        Settings.from_document(document["settings"]),
     )
 
 
-def rows_left_out(case: Case, facts: Mapping[str, Any]) -> np.ndarray:
-    """Which measurements of the training poses a diagnosis left out as gross errors,
-    ndarray of bool (N,)."""
-    left_out = [
+def find_rejected_rows(case: Case, facts: Mapping[str, Any]) -> np.ndarray:
+    """Find the training measurements (N,) that a diagnosis rejected as gross errors."""
+    rejected = [
         row for entry in facts["document"]["gross_errors"] for row in entry["rows"]
     ]
-    return np.isin(case.campaign.measurements.row, left_out)
+    return np.isin(case.campaign.measurements.row, rejected)
 
 
-def step_fit(case: Case, step: Mapping[str, Any]) -> Fit:
-    """The fit of one step of diagnosis.json; it starts where it once ended."""
-    model, estimate = step_model(case, step)
+def refit_step(case: Case, step: Mapping[str, Any]) -> Fit:
+    """Fit the model of a step of diagnosis.json again, starting at its estimate."""
+    model, estimate = restore_step_model(case, step)
     return fit_model(model, case.observations, parse_noise(step), estimate)
 
 
-def step_model(case: Case, step: Mapping[str, Any]) -> tuple[Model, Estimate]:
-    """Return model and estimate of one step of diagnosis.json, without a fit."""
+def restore_step_model(case: Case, step: Mapping[str, Any]) -> tuple[Model, Estimate]:
+    """Restore model and estimate of a step of diagnosis.json without a fit."""
     catalogue = {effect.key: effect for effect in case.model.effects} | case.candidates
     effects = []
     for key, priors in zip(step["effects"], step["priors"], strict=True):
         effect = catalogue[key]
-        # A prior that differs from the catalogue's is one whose size was estimated.
+        # If a prior differs from the catalogue's, the diagnosis has estimated its size.
         parameters = tuple(
             replace(parameter, prior_std=prior, sized=prior != parameter.prior_std)
             for parameter, prior in zip(effect.parameters, priors, strict=True)
@@ -199,13 +222,13 @@ def step_model(case: Case, step: Mapping[str, Any]) -> tuple[Model, Estimate]:
     values: dict[str, Any] = {}
     for name in _PLACEMENTS:
         values[name] = np.array(stated[name], float)
-    for name in _OF_EFFECTS:
+    for name in _EFFECT_PARAMETERS:
         values[name] = tuple(np.array(entry, float) for entry in stated[name])
     model = replace(case.model, effects=tuple(effects))
     return model, Estimate(tuple(stated["sessions"]), **values)
 
 
-def candidate_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+def tabulate_candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Return the rows of candidates.csv.
 
     Tested candidates come first, by falling Bayes factor, then the others with a note
@@ -217,8 +240,8 @@ def candidate_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     rows = []
     untestable = dict.fromkeys(candidates, "the measurements are at fault")
     if diagnosis.evidence:
-        rows = _tested_candidate_rows(diagnosis.evidence)
-        untestable = diagnosis.evidence.linearized.untestable
+        rows = _tabulate_tested_candidates(diagnosis.evidence)
+        untestable = diagnosis.evidence.design.untestable
     tested = {row["candidate"] for row in rows}
     for key, candidate in candidates.items():
         if key not in tested:
@@ -236,9 +259,9 @@ def candidate_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     return rows
 
 
-def _tested_candidate_rows(evidence: Evidence) -> list[dict[str, Any]]:
+def _tabulate_tested_candidates(evidence: Evidence) -> list[dict[str, Any]]:
     """Return the rows of the candidates that were tested, by falling Bayes factor."""
-    problem = evidence.linearized.problem
+    problem = evidence.design.problem
     posterior = evidence.posterior
     log_bayes_factors = screen_terms(problem)[1]
     inclusion = np.zeros(len(problem.terms))
@@ -266,35 +289,41 @@ def _tested_candidate_rows(evidence: Evidence) -> list[dict[str, Any]]:
     return rows
 
 
-def parameter_columns(fitted: Fit) -> dict[str, np.ndarray | list[str]]:
-    """Columns of the parameters table of a fit."""
-    named = list_parameters(fitted.model, fitted.estimate)
+def tabulate_parameters(fitted: Fit) -> dict[str, np.ndarray | list[str]]:
+    """Return the columns of the steps table for the parameters of one fit."""
+    owners = []
+    parameters = []
+    for owner, parameter in list_parameters(fitted.model, fitted.estimate):
+        owners.append(owner)
+        parameters.append(parameter)
+    prior_std = [parameter.prior_std for parameter in parameters]
     return {
-        "owner": [owner for owner, _ in named],
-        "parameter": [parameter.name for _, parameter in named],
-        "unit": [parameter.unit for _, parameter in named],
-        "value": _absolute_values(fitted.model, fitted.estimate),
+        "owner": owners,
+        "parameter": [parameter.name for parameter in parameters],
+        "unit": [parameter.unit for parameter in parameters],
+        "value": _stack_values(fitted.model, fitted.estimate),
         "std_error": np.sqrt(np.diag(fitted.covariance)),
         "held": fitted.unidentifiable,
-        "prior_std": np.array(
-            [np.nan if p.prior_std is None else p.prior_std for _, p in named]
-        ),
+        # A missing prior becomes NaN.
+        "prior_std": np.array(prior_std, float),
     }
 
 
-def _absolute_values(model: Model, estimate: Estimate) -> np.ndarray:
-    parts = []
+def _stack_values(model: Model, estimate: Estimate) -> np.ndarray:
+    """Return the values of all parameters (P,), in the order of `list_parameters`;
+    placements are absolute."""
+    values = [np.zeros(0)]
     if model.fitted_frames:
-        for shift, turn in zip(
+        for position, rotation in zip(
             estimate.frame_position, estimate.frame_rotation, strict=True
         ):
-            parts += [shift, Rotation.from_matrix(turn).as_rotvec()]
-    for number, fitted in model.fitted_target_components:
-        turn = Rotation.from_matrix(estimate.target_rotation[number]).as_rotvec()
-        parts.append(np.concatenate([estimate.target_offset[number], turn])[fitted])
-    effects = [
-        part
-        for pair in zip(estimate.coefficients, estimate.shapes, strict=True)
-        for part in pair
-    ]
-    return np.concatenate([*parts, *effects]) if parts or effects else np.zeros(0)
+            values += [position, Rotation.from_matrix(rotation).as_rotvec()]
+    for target, fitted in model.fitted_target_components:
+        rotation_vector = Rotation.from_matrix(
+            estimate.target_rotation[target]
+        ).as_rotvec()
+        placement = np.concatenate([estimate.target_offset[target], rotation_vector])
+        values.append(placement[fitted])
+    for pair in zip(estimate.coefficients, estimate.shapes, strict=True):
+        values += pair
+    return np.concatenate(values)

@@ -1,5 +1,5 @@
-"""Step 1: a campaign's folder to descriptions and measurements, those to fit apart from
-those to test."""
+"""Step 1 of the loop: read a campaign's folder, and split its measurements into those to
+fit and those to validate."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from elastocal.effects.catalogue import list_effects
 from elastocal.errors import InputError
 from elastocal.io.json_files import write_json
 from elastocal.io.origin import describe_provenance
-from elastocal.io.plugins import REGRESSIONS, plugin_names
+from elastocal.io.plugins import REGRESSIONS, list_plugin_names
 from elastocal.io.storage import write_table
-from elastocal.loop.schemas import measurements
+from elastocal.loop.schemas import build_measurements_schema
 
 if TYPE_CHECKING:
     from typing import Any
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.campaigns.campaign_folder import CampaignFolder
 
-# What `remainder` of campaign.yaml may be: the choices and the names of this package's
-# regressions, see `residual_model.regressions.REGRESSIONS`.
+# Values that `remainder` of campaign.yaml may have besides plug-ins. They are listed
+# here because reading a campaign must not import `residual_model.regressions`.
 REMAINDERS = (
     "auto",
     "none",
@@ -36,18 +36,17 @@ REMAINDERS = (
 
 
 def read_campaign(job: Any) -> None:
-    """The step of a rule: a campaign's folder as tables."""
+    """Convert a campaign's folder to tables. Called by a rule of the workflow."""
     folder = read_campaign_folder(job.params.folder, job.params.robots)
     descriptions, training, held_out = load_campaign(folder)
-    for path, part in (
+    for path, measurements in (
         (job.output.training, training),
         (job.output.held_out, held_out),
     ):
-        schema = measurements(part.joint_angles.shape[1])
         write_table(
             path,
-            schema,
-            [tabulate_measurements(part)],
+            build_measurements_schema(measurements.joint_angles.shape[1]),
+            [tabulate_measurements(measurements)],
             describe_provenance(descriptions, **job.wildcards),
         )
     write_json(job.output.descriptions, descriptions)
@@ -56,7 +55,7 @@ def read_campaign(job: Any) -> None:
 def load_campaign(
     folder: CampaignFolder,
 ) -> tuple[dict[str, Any], Measurements, Measurements]:
-    """Read a campaign and part its measurements into training and held-out ones.
+    """Read a campaign and split its measurements.
 
     Returns
     -------
@@ -69,26 +68,34 @@ def load_campaign(
     InputError
         As `reading.read_campaign` and `reading.read_held_out_campaign`.
     """
-    descriptions, campaign = described_campaign(folder)
+    descriptions, campaign = read_described_campaign(folder)
     training, held_out = split_poses(campaign)
     held_out_descriptions = None
     held_out_campaign = reading.read_held_out_campaign(folder, list_effects())
     if folder.held_out_folder is not None and held_out_campaign is not None:
-        held_out_descriptions = _descriptions(folder.held_out_folder, held_out_campaign)
+        held_out_descriptions = _describe(folder.held_out_folder, held_out_campaign)
         held_out = held_out_campaign.measurements
     return descriptions | {"held_out": held_out_descriptions}, training, held_out
 
 
-def described_campaign(folder: CampaignFolder) -> tuple[dict[str, Any], Campaign]:
-    """Read a campaign with its descriptions as `load_campaign`, but undivided and
+def read_described_campaign(
+    folder: CampaignFolder,
+) -> tuple[dict[str, Any], Campaign]:
+    """Read a campaign with its descriptions as `load_campaign`, but without a split and
     without the campaign that validates it."""
     campaign = reading.read_campaign(folder, list_effects())
-    return _descriptions(folder, campaign), campaign
+    return _describe(folder, campaign), campaign
 
 
-def _descriptions(folder: CampaignFolder, campaign: Campaign) -> dict[str, Any]:
-    _check_remainder(folder.document.get("remainder", "auto"), folder.source)
-    # Optional keys get their defaults here, so that no later step has to know them.
+def _describe(folder: CampaignFolder, campaign: Campaign) -> dict[str, Any]:
+    """Return the documents of a campaign with the defaults of optional keys, so that no
+    later step has to know them."""
+    regression = folder.document.get("remainder", "auto")
+    allowed = [*REMAINDERS, *list_plugin_names(REGRESSIONS)]
+    if regression not in allowed:
+        raise InputError(
+            folder.source, "remainder", repr(regression), ", ".join(allowed)
+        )
     defaults = {"compliance": "nominal", "declared": [], "holdout": DEFAULT_HOLDOUT}
     table = {"table": campaign.table, "header_line": campaign.header_line}
     return {
@@ -96,11 +103,3 @@ def _descriptions(folder: CampaignFolder, campaign: Campaign) -> dict[str, Any]:
         "campaign": defaults | folder.document | table,
         "robot": folder.robot_document,
     }
-
-
-def _check_remainder(name: str, source: str) -> None:
-    """Refuse a regression that neither this package nor a plug-in has."""
-    # Names alone: reading a campaign must not load the regressions themselves.
-    allowed = [*REMAINDERS, *plugin_names(REGRESSIONS)]
-    if name not in allowed:
-        raise InputError(source, "remainder", repr(name), ", ".join(allowed))

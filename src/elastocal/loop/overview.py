@@ -84,7 +84,7 @@ class Overview:
     attention: list[str]
 
 
-def overview(folder: str | Path, robots_folder: str | Path) -> Overview:
+def inspect_campaign(folder: str | Path, robots_folder: str | Path) -> Overview:
     """Inspect a campaign before its diagnosis.
 
     Parameters

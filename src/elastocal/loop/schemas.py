@@ -1,5 +1,4 @@
-"""Every table that the loop keeps, column by column, written down here and nowhere
-else; and its residuals as they are read."""
+"""Schemas of the tables that the loop stores, and access to stored residuals."""
 
 from __future__ import annotations
 
@@ -17,46 +16,43 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 _STATE = ("session", "pose", "load", "repeat", "target", "row")
-# What a campaign may not have recorded; it is not a number there.
+# Beginnings of the names of columns that a campaign need not record; they hold NaN then.
 _OPTIONAL = ("rx", "ry", "rz", "approach", "time_s", "temperature_c", "u95_m")
+# Residuals of the declared model and of the final one, by the prefix of their columns.
+_STAGES = {"before": "declared model", "after": "with the effects found"}
 
 
-def _columns(joints: int) -> dict[str, Column]:
-    """Columns of a file of measurements as the library takes them: targets by number,
-    angles as the chain counts them."""
-    found = {
-        name: replace(c, missing=name.startswith(_OPTIONAL))
-        for name, c in describe_columns(joints).items()
-    }
-    found |= {
-        name: replace(found[name], meaning=f"angle of joint {name[1:]} of the chain")
-        for name in _angles(joints)
-    }
-    target = Column(
+def build_measurements_schema(joints: int) -> TableSchema:
+    """Return the schema of the measurements of a campaign.
+
+    It differs from that of the user's file in two columns: targets are numbers, and
+    joint angles are those of the chain.
+    """
+    columns = {}
+    for name, column in describe_columns(joints).items():
+        columns[name] = replace(column, missing=name.startswith(_OPTIONAL))
+    for name in _name_angles(joints):
+        meaning = f"angle of joint {name[1:]} of the chain"
+        columns[name] = replace(columns[name], meaning=meaning)
+    columns["target"] = Column(
         "target",
         "int32",
         "",
         "number of the target, in the order of the campaign, from 0",
         minimum=0,
     )
-    row = Column(
+    columns["row"] = Column(
         "row",
         "int32",
         "",
         "row in the file of measurements, 1 for the first of data",
         minimum=1,
     )
-    return found | {"target": target, "row": row}
+    return TableSchema("measurements", tuple(columns.values()))
 
 
-def _angles(joints: int) -> list[str]:
+def _name_angles(joints: int) -> list[str]:
     return [f"q{joint}" for joint in range(1, joints + 1)]
-
-
-def measurements(joints: int) -> TableSchema:
-    """Measurements of a campaign, as the library takes them; what was not recorded is
-    not a number."""
-    return TableSchema("measurements", (*_columns(joints).values(),))
 
 
 STEPS = TableSchema(
@@ -100,63 +96,55 @@ STEPS = TableSchema(
 )
 
 
-def residuals(joints: int) -> TableSchema:
-    """Every measurement, before and after; positions in base axes."""
-    columns = _columns(joints)
-    return TableSchema(
-        "residuals",
-        (
-            *(columns[name] for name in _STATE),
-            Column("held_out", "bool", "", "whether no step but the last has seen it"),
-            Column(
-                "gross_error",
-                "bool",
-                "",
-                "whether no model explains the row, so that every fit and error leaves it out",
-            ),
-            Column(
-                "outside_range",
-                "bool",
-                "",
-                "whether its held-out pose lies outside the range of the fitted poses",
-            ),
-            *(
-                columns[name]
-                for name in ("time_s", *_angles(joints), *WRENCH_NAMES, *"xyz")
-            ),
-            *(
-                Column(
-                    f"{stage}_{name}",
-                    "float64",
-                    unit,
-                    f"{meaning}, measured less predicted, {words}",
-                    missing=True,
-                )
-                for stage, words in (
-                    ("before", "declared model"),
-                    ("after", "with the effects found"),
-                )
-                for name, unit, meaning in COMPONENTS
-            ),
+def build_residuals_schema(joints: int) -> TableSchema:
+    """Return the schema of the residuals of every measurement before and after the
+    diagnosis; positions are in base axes."""
+    measured = {
+        column.name: column for column in build_measurements_schema(joints).columns
+    }
+    columns = [measured[name] for name in _STATE]
+    columns += [
+        Column("held_out", "bool", "", "whether no step but the last has seen it"),
+        Column(
+            "gross_error",
+            "bool",
+            "",
+            "whether no model explains the row, so that every fit and error leaves it out",
         ),
-    )
+        Column(
+            "outside_range",
+            "bool",
+            "",
+            "whether its held-out pose lies outside the range of the fitted poses",
+        ),
+        measured["time_s"],
+    ]
+    columns += [
+        measured[name] for name in (*_name_angles(joints), *WRENCH_NAMES, *"xyz")
+    ]
+    for stage, model in _STAGES.items():
+        for name, unit, component in COMPONENTS:
+            meaning = f"{component}, measured less predicted, {model}"
+            columns.append(
+                Column(f"{stage}_{name}", "float64", unit, meaning, missing=True)
+            )
+    return TableSchema("residuals", tuple(columns))
 
 
 def read_residuals(path: str | Path, joints: int) -> dict[str, np.ndarray]:
-    """Columns of a residuals table, of the rows that are no gross errors."""
-    columns = read_table(path, residuals(joints))
-    return {name: values[~columns["gross_error"]] for name, values in columns.items()}
+    """Read the columns of a residuals table, without the rows of gross errors."""
+    columns = read_table(path, build_residuals_schema(joints))
+    kept = ~columns["gross_error"]
+    return {name: values[kept] for name, values in columns.items()}
 
 
-def worst_measurement(table: Mapping[str, np.ndarray]) -> int:
-    """Row of a residuals table with the largest position error of the declared
+def find_worst_measurement(table: Mapping[str, np.ndarray]) -> int:
+    """Find the row of a residuals table with the largest position error of the declared
     model."""
-    return int(
-        np.argmax(np.linalg.norm([table[f"before_d{axis}"] for axis in "xyz"], axis=0))
-    )
+    residual = [table[f"before_d{axis}"] for axis in "xyz"]
+    return int(np.argmax(np.linalg.norm(residual, axis=0)))
 
 
-def angles_of(table: Mapping[str, np.ndarray], joints: int) -> np.ndarray:
-    """Joint angles (N, n) of a residuals table, as the model of the robot counts them,
-    rad."""
-    return np.column_stack([table[name] for name in _angles(joints)])
+def stack_joint_angles(table: Mapping[str, np.ndarray], joints: int) -> np.ndarray:
+    """Return the joint angles (N, n) of a residuals table, those of the chain, rad."""
+    return np.column_stack([table[name] for name in _name_angles(joints)])

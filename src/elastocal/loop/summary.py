@@ -1,5 +1,5 @@
-"""All campaigns on one page: verdicts, and held-out errors before and after; folds of
-one campaign are pooled."""
+"""Summarize the verdicts and held-out errors of all campaigns in one table; the folds of
+a campaign are pooled."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from elastocal.io.data_frames import read_frame, write_csv
-from elastocal.loop.schemas import residuals
+from elastocal.loop.schemas import build_residuals_schema
 from elastocal.random_streams import open_stream
 from elastocal.validation.held_out import (
     PositionErrors,
@@ -21,30 +21,29 @@ from elastocal.verdict import Verdict, read_verdict
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+# Replicates of the bootstrap over poses.
 _REPLICATES = 1000
 _STAGES = ("before", "after")
 
 
 def summarize_campaigns(job: Any) -> None:
-    """The step of a rule: all campaigns of one kind as one table."""
+    """Write the table of all campaigns of one kind. Called by a rule of the workflow."""
     settings = job.params
     verdicts = {
         name: read_verdict(path)
         for name, path in zip(settings.campaigns, job.input.verdicts, strict=True)
     }
-    held_out = {
-        name: read_frame(path, residuals(len(verdicts[name].noise.joint_rad))).query(
-            "held_out and not gross_error"
-        )
-        for name, path in zip(settings.campaigns, job.input.residuals, strict=True)
-    }
+    held_out = {}
+    for name, path in zip(settings.campaigns, job.input.residuals, strict=True):
+        schema = build_residuals_schema(len(verdicts[name].noise.joint_rad))
+        held_out[name] = read_frame(path, schema).query("held_out and not gross_error")
     write_csv(
         job.output.table,
-        campaign_rows(verdicts, held_out, settings.folds, settings.seed),
+        tabulate_campaigns(verdicts, held_out, settings.folds, settings.seed),
     )
 
 
-def campaign_rows(
+def tabulate_campaigns(
     verdicts: Mapping[str, Verdict],
     residuals: Mapping[str, pd.DataFrame],
     folds: dict[str, list[str]],
@@ -68,57 +67,53 @@ def campaign_rows(
     rows = []
     for name, members in groups.items():
         held_out = pd.concat([residuals[member] for member in members])
-        stated = pd.Series(
-            [verdicts[member].verdict for member in members]
-        ).value_counts()
-        named = pd.Series(
-            [_effects(verdicts[member]) for member in members]
-        ).value_counts()
         head = {
             "campaign": name,
-            "verdict": _counted(stated, len(members)),
-            "effects": _counted(named, len(members)),
+            "verdict": _count_values([verdicts[member].verdict for member in members]),
+            "effects": _count_values(
+                [_format_effects(verdicts[member]) for member in members]
+            ),
         }
         session: Any
-        for session, part in held_out.groupby("session"):
-            rows.append(
-                head
-                | {"session": session}
-                | _errors(part, open_stream(seed, name, "summary", session))
-            )
+        for session, measurements in held_out.groupby("session"):
+            draws = open_stream(seed, name, "summary", session)
+            errors = _summarize_session(measurements, draws)
+            rows.append(head | {"session": session} | errors)
     return pd.DataFrame(rows)
 
 
-def _effects(verdict: Verdict) -> str:
-    at = [
-        (effect.name, ", ".join(map(str, effect.joints))) for effect in verdict.effects
-    ]
-    return (
-        " + ".join(
-            f"{name} (joint {joints})" if joints else name for name, joints in at
-        )
-        or "none"
+def _format_effects(verdict: Verdict) -> str:
+    """Return the names of the missing effects with their joints."""
+    effects = []
+    for effect in verdict.effects:
+        joints = ", ".join(map(str, effect.joints))
+        effects.append(f"{effect.name} (joint {joints})" if joints else effect.name)
+    return " + ".join(effects) or "none"
+
+
+def _count_values(values: list[str]) -> str:
+    """Return the value of a campaign, or how many of its folds have each value."""
+    if len(values) == 1:
+        return values[0]
+    counts = pd.Series(values).value_counts()
+    return "; ".join(
+        f"{count} of {len(values)}: {value}" for value, count in counts.items()
     )
 
 
-def _counted(counts: pd.Series, total: int) -> str:
-    if total == 1:
-        return counts.index[0]
-    return "; ".join(f"{count} of {total}: {value}" for value, count in counts.items())
-
-
-def _errors(part: pd.DataFrame, draws: np.random.Generator) -> dict[str, float]:
-    """Errors of averaged measurements: repeats of a state count once."""
-    state = ["pose", "load", "target"]
+def _summarize_session(
+    measurements: pd.DataFrame, draws: np.random.Generator
+) -> dict[str, float]:
+    """Return the error columns of a session; repeats of a state count once, as their
+    mean."""
     columns = [f"{stage}_{axis}" for stage in _STAGES for axis in ("dx", "dy", "dz")]
-    mean = part.groupby(state, sort=True)[columns].mean()
-    cluster = np.unique(mean.index.get_level_values("pose"), return_inverse=True)[1]
-    errors = [
-        PositionErrors(
-            np.linalg.norm(mean[columns[3 * k : 3 * k + 3]], axis=1), cluster
-        )
-        for k in range(len(_STAGES))
-    ]
+    means = measurements.groupby(["pose", "load", "target"], sort=True)[columns].mean()
+    poses = means.index.get_level_values("pose")
+    cluster = np.unique(poses, return_inverse=True)[1]
+    errors = []
+    for first in (0, 3):
+        residual = means[columns[first : first + 3]]
+        errors.append(PositionErrors(np.linalg.norm(residual, axis=1), cluster))
     limits, reductions = compute_error_intervals(errors, _REPLICATES, draws)
     row: dict[str, float] = {"poses": errors[0].poses}
     for stage, error, limit in zip(_STAGES, errors, limits, strict=True):

@@ -1,5 +1,5 @@
-"""A campaign's folder to its verdict in one call: what the blind proof, benchmarks and
-notebooks use. The pipeline makes the same two calls, with tables between them."""
+"""From a campaign's folder to its verdict in one call, for the blind proof, benchmarks
+and notebooks. The pipeline makes the same two calls with tables between them."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from elastocal.fitting.model import Case, build_case
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import write_table
-from elastocal.loop import diagnosis_tables as tables
+from elastocal.loop.diagnosis_tables import load_case, restore_diagnosis
 from elastocal.loop.loading import load_campaign
-from elastocal.loop.schemas import residuals
+from elastocal.loop.schemas import build_residuals_schema
 from elastocal.validation.held_out import compute_position_residuals
 from elastocal.validation.transfer import transfer_fit
 from elastocal.verdict import PredictedErrors, write_verdict
@@ -45,44 +45,46 @@ if TYPE_CHECKING:
 
 
 def judge_campaign(job: Any) -> None:
-    """The step of a rule: the verdict, every model on poses that no step has seen."""
-    # Who asks for the verdict alone starts without pandas.
+    """Judge every model on the validation poses and write the verdict. Called by a rule
+    of the workflow."""
+    # Import pandas only here, because a diagnosis in one call does not need it.
     import pandas as pd
 
     from elastocal.io.data_frames import write_csv
 
-    case = tables.load_case(job.input.descriptions, job.input.training)
-    held_out = tables.load_case(job.input.descriptions, job.input.held_out, "held_out")
-    found = tables.diagnosis_from(case, read_json(job.input.diagnosis))
-    verdict = judged(found, held_out, job.params.seed)
-    write_verdict(job.output.verdict, verdict.verdict)
-    write_csv(job.output.before_after, pd.DataFrame(verdict.rows))
-    schema = residuals(case.campaign.robot.joints)
+    case = load_case(job.input.descriptions, job.input.training)
+    held_out = load_case(job.input.descriptions, job.input.held_out, "held_out")
+    diagnosis = restore_diagnosis(case, read_json(job.input.diagnosis))
+    judgement = judge_and_predict(diagnosis, held_out, job.params.seed)
+    write_verdict(job.output.verdict, judgement.verdict)
+    write_csv(job.output.before_after, pd.DataFrame(judgement.rows))
     write_table(
         job.output.residuals,
-        schema,
-        generate_residual_blocks(found, verdict),
+        build_residuals_schema(case.campaign.robot.joints),
+        generate_residual_blocks(diagnosis, judgement),
         describe_provenance(job.params, **job.wildcards),
     )
 
 
-def cases_in(folder: str | Path, robots_folder: str | Path) -> tuple[Case, Case]:
-    """Training and held-out cases of a campaign's folder.
+def read_cases(folder: str | Path, robots_folder: str | Path) -> tuple[Case, Case]:
+    """Read the training case and the held-out case of a campaign's folder.
 
-    `folder`, `robots_folder`: as in `read_campaign_folder`.
+    Parameters
+    ----------
+    folder, robots_folder : str or path
+        As in `read_campaign_folder`.
     """
     descriptions, training, held_out = load_campaign(
         read_campaign_folder(folder, robots_folder)
     )
+    held_out_descriptions = descriptions["held_out"] or descriptions
     return (
         build_case(descriptions, tabulate_measurements(training)),
-        build_case(
-            descriptions["held_out"] or descriptions, tabulate_measurements(held_out)
-        ),
+        build_case(held_out_descriptions, tabulate_measurements(held_out)),
     )
 
 
-def diagnosed(
+def diagnose_folder(
     folder: str | Path,
     robots_folder: str | Path,
     seed: int,
@@ -90,15 +92,26 @@ def diagnosed(
 ) -> dict[str, Any]:
     """Diagnose a campaign and judge it on its held-out poses.
 
-    `folder`, `robots_folder`: as in `read_campaign_folder`. Returns as verdict.json.
+    Parameters
+    ----------
+    folder, robots_folder : str or path
+        As in `read_campaign_folder`.
+    seed : int
+        Seed of all random streams.
+    settings : Settings, optional
+        Settings of the diagnosis.
+
+    Returns
+    -------
+    dict
+        Contents of verdict.json.
     """
-    training, held_out = cases_in(folder, robots_folder)
-    return judged(
-        diagnose(training, settings or Settings(), seed), held_out, seed
-    ).document
+    training, held_out = read_cases(folder, robots_folder)
+    diagnosis = diagnose(training, settings or Settings(), seed)
+    return judge_and_predict(diagnosis, held_out, seed).document
 
 
-def calibrated_by(
+def build_calibrated_robot(
     diagnosis: Diagnosis,
     held_out: Case,
     delivered: CorrectedResiduals | None,
@@ -113,7 +126,7 @@ def calibrated_by(
         Result of the training poses.
     held_out : Case
         Validation poses without gross errors.
-    delivered : Corrected or None
+    delivered : CorrectedResiduals or None
         Result of `judge.apply_regression`.
     physics_only : bool
         Whether to leave out the regression. The residual of the final model is then
@@ -144,48 +157,46 @@ def calibrated_by(
     return inflate_to_held_out_errors(robot, held_out, residual, noise_m)
 
 
-def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
-    """The verdict of a diagnosis on held-out poses, with the accuracy of the corrected
-    robot and the cost of each effect.
+def judge_and_predict(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
+    """Judge a diagnosis on held-out poses, and predict the accuracy of the corrected
+    robot.
 
-    ``accuracy`` and ``uncorrected_m``, the RMS error without a correction at the same
-    poses, are predicted; ``cost_m`` of an effect is the RMS error over the campaign's
-    poses and loads if it alone were left out of the correction. All are None where the
-    data are at fault, the cost also of an effect that is in no command. ``misplaced``:
-    what was declared wrongly, see there. ``physics``: accuracy and ``uncorrected_m`` of
-    a robot that is corrected without the regression on the remainder; None where there
-    is none.
+    Adds to the verdict, unless the data have a fault: ``accuracy``; ``uncorrected_m``,
+    the RMS error at the same poses without a correction; ``physics``, both numbers for
+    a robot that is corrected without the residual regression, None if there is no
+    regression; ``cost_m`` of each effect that a command contains, the RMS error over
+    the campaign's poses and loads if this effect alone were left out of the
+    correction; and ``misplaced`` frames.
     """
     judgement = judge(diagnosis, held_out, seed)
     verdict = judgement.verdict
     if verdict.faults:
         return judgement
-    robot = calibrated_by(diagnosis, judgement.held_out, judgement.delivered)
+    robot = build_calibrated_robot(diagnosis, judgement.held_out, judgement.delivered)
     physics = None
     if robot.residual_model is not None:
-        physics_robot = calibrated_by(
+        physics_robot = build_calibrated_robot(
             diagnosis, judgement.held_out, judgement.delivered, physics_only=True
         )
         physics = _predict_errors(physics_robot)
     contributions = compute_effect_contributions(
         replace(robot, residual_model=None), *select_campaign_commands(robot)
     )
+    effects = tuple(
+        replace(effect, cost_m=contributions.get(effect.name))
+        for effect in verdict.missing_effects
+    )
     predicted = _predict_errors(robot)
     misplaced = find_misplaced_frames(diagnosis.final, diagnosis.case.campaign)
-    return replace(
-        judgement,
-        verdict=replace(
-            verdict,
-            effects=tuple(
-                replace(effect, cost_m=contributions.get(effect.name))
-                for effect in verdict.missing_effects
-            ),
-            accuracy=predicted.accuracy,
-            uncorrected_m=predicted.uncorrected_m,
-            physics=physics,
-            misplaced=tuple(misplaced),
-        ),
+    verdict = replace(
+        verdict,
+        effects=effects,
+        accuracy=predicted.accuracy,
+        uncorrected_m=predicted.uncorrected_m,
+        physics=physics,
+        misplaced=tuple(misplaced),
     )
+    return replace(judgement, verdict=verdict)
 
 
 def _predict_errors(robot: CalibratedRobot) -> PredictedErrors:

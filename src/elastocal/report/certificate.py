@@ -1,5 +1,4 @@
-"""What a certificate states, from its contents: sentences and tables of
-`certificate.txt`, and its pages."""
+"""Collect what the pages and the summary of a certificate state, from its contents."""
 
 from __future__ import annotations
 
@@ -16,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from typing import Any
 
+# Entries of the error budget that have other words than an effect of the catalogue.
 _SHARES = {
     "joint_compliance": "joint compliance under loads and weights",
     "declared_weight": "errors of the declared weights",
@@ -27,58 +27,59 @@ _SHARES = {
     "regression": "regression on the remainder",
     "left by the regression": "left by the regression on the remainder",
 }
-# Below the digits of any tracker.
-_NOTHING_M = 1e-7
+# A smaller contribution is printed as below this length, which no tracker resolves.
+_SMALLEST_SHOWN_M = 1e-7
+# Sections of the template that are lists of sentences; the others are one paragraph.
 _LISTS = ("misplaced", "identity", "data")
 
 
-def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Facts for the pages of a certificate.
+def collect_certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the facts for the pages of a certificate: strings ready to print, and lists
+    for tables.
 
-    `document`: of `calibrated_files.certificate`. Returns JSON-serialisable; strings
-    ready to print, lists for tables.
+    Parameters
+    ----------
+    document : mapping
+        As `calibrated_files.build_certificate` returns it.
     """
-    repeatable = document.get("repeatable")
-    spoken = {
-        "joint_ranges": [JointRange(**ends) for ends in document["joint_ranges"]],
-        "accuracy_sentence": format_accuracy(Accuracy(**document["accuracy"])),
-        "title": format_title(
-            document["verdict"],
-            document["effects"],
-            RepeatableResidual(**repeatable) if repeatable else None,
-        ),
-    }
-    stated = render_sentences(
-        "certificate.txt", say.FILTERS, document=document, **spoken
+    repeatable = None
+    if document.get("repeatable"):
+        repeatable = RepeatableResidual(**document["repeatable"])
+    sections = render_sentences(
+        "certificate.txt",
+        say.FILTERS,
+        document=document,
+        joint_ranges=[JointRange(**limits) for limits in document["joint_ranges"]],
+        accuracy_sentence=format_accuracy(Accuracy(**document["accuracy"])),
+        title=format_title(document["verdict"], document["effects"], repeatable),
     )
-    budget = []
-    for line in document["budget"]:
-        below = 0.0 < line["rms_m"] < _NOTHING_M
-        hidden = line["name"] == "repeatability" and not line["rms_m"]
-        size = (
-            f"below {say.length(_NOTHING_M, 1)}" if below else say.length(line["rms_m"])
-        )
-        budget.append(
-            [
-                share_name(line["name"]),
-                "hidden by the tracker's noise" if hidden else size,
-            ]
-        )
-    return {
-        **{
-            name: lines if name in _LISTS else " ".join(lines)
-            for name, lines in stated.items()
-        },
+    paragraphs = {
+        name: sentences if name in _LISTS else " ".join(sentences)
+        for name, sentences in sections.items()
+    }
+    return paragraphs | {
         "campaign": document["campaign"],
         "robot": document["robot"],
         "decision": document["conformity"]["decision"],
         "errors": document["errors"],
-        "floor": say.length(document["noise_floor_rms_m"]),
-        "budget": budget,
+        "floor": say.format_length(document["noise_floor_rms_m"]),
+        "budget": [
+            [name_budget_entry(entry["name"]), _format_contribution(**entry)]
+            for entry in document["budget"]
+        ],
         "budget_states": format_count(document["budget_states"], "state"),
     }
 
 
-def share_name(name: str) -> str:
-    """A line of the error budget in words."""
-    return _SHARES.get(name) or say.physical_name(name)
+def _format_contribution(name: str, rms_m: float) -> str:
+    """Return the size of an entry of the error budget."""
+    if name == "repeatability" and not rms_m:
+        return "hidden by the tracker's noise"
+    if 0.0 < rms_m < _SMALLEST_SHOWN_M:
+        return f"below {say.format_length(_SMALLEST_SHOWN_M, 1)}"
+    return say.format_length(rms_m)
+
+
+def name_budget_entry(name: str) -> str:
+    """Return an entry of the error budget in words."""
+    return _SHARES.get(name) or say.name_effect(name)

@@ -16,7 +16,7 @@ from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.effects.catalogue import list_effects
 from elastocal.effects.protocol import effect_of
 from elastocal.report import words as say
-from elastocal.report.measured import measured_rows
+from elastocal.report.measured import tabulate_measured
 from elastocal.report.typesetting import render_sentences
 from elastocal.verdict import DataFault, Effect, EffectParameter
 
@@ -99,7 +99,7 @@ def format_title(
     return TITLES[verdict] + (AND_MORE if effects and remains else "")
 
 
-def campaign_sentences(
+def render_campaign_sentences(
     verdict: Verdict,
     steps: Sequence[Mapping[str, Any]] = (),
     experiment: Sequence[Mapping[str, Any]] = (),
@@ -117,7 +117,7 @@ def campaign_sentences(
         Contents of campaign.json; without them nothing is stated of the method.
     """
     effects = [
-        effect_facts(effect, verdict.heldout) for effect in verdict.missing_effects
+        describe_effect(effect, verdict.heldout) for effect in verdict.missing_effects
     ]
     return render_sentences(
         "campaign.txt",
@@ -133,7 +133,7 @@ def campaign_sentences(
     )
 
 
-def loop_facts(
+def collect_loop_facts(
     verdict: Verdict,
     steps: Sequence[Mapping[str, Any]],
     experiment: Sequence[Mapping[str, Any]],
@@ -161,13 +161,13 @@ def loop_facts(
     """
     heldout = verdict.heldout
     faulty = bool(verdict.faults)
-    stated = campaign_sentences(verdict, steps, experiment, descriptions)
+    stated = render_campaign_sentences(verdict, steps, experiment, descriptions)
     paragraphs = {
         name: lines if name in _LISTS else " ".join(lines)
         for name, lines in stated.items()
     }
-    effects = [effect_facts(effect, heldout) for effect in verdict.missing_effects]
-    faults = [fault_facts(fault) for fault in verdict.faults]
+    effects = [describe_effect(effect, heldout) for effect in verdict.missing_effects]
+    faults = [describe_fault(fault) for fault in verdict.faults]
     title = format_title(verdict.verdict, verdict.effects, verdict.repeatable)
     return {
         **paragraphs,
@@ -177,17 +177,17 @@ def loop_facts(
         "verdict": AT_FAULT if faulty else title,
         "faulty": faulty,
         "headline": dict(stated["headline"]) or None,
-        "causes": [] if verdict.verdict == "not_testable" else cause_rows(verdict),
+        "causes": [] if verdict.verdict == "not_testable" else tabulate_causes(verdict),
         "errors": tabulate_errors(verdict),
-        "measured": measured_rows(table, descriptions),
-        "floor": say.length(heldout.noise_floor_rms_m),
-        "steps": step_rows(steps, heldout.noise_floor_rms_m),
+        "measured": tabulate_measured(table, descriptions),
+        "floor": say.format_length(heldout.noise_floor_rms_m),
+        "steps": tabulate_steps(steps, heldout.noise_floor_rms_m),
         "effects": faults or effects,
-        "experiment": experiment_facts(experiment),
-        "compliances": compliance_rows(verdict.compliance_urad_per_Nm),
+        "experiment": tabulate_experiment(experiment),
+        "compliances": tabulate_compliances(verdict.compliance_urad_per_Nm),
         "compliances_identified": any(verdict.compliance_urad_per_Nm.std_error),
-        "held": held_rows(_list_undetermined(verdict, parameters)),
-        "untestable": untestable_rows(verdict.untestable),
+        "held": tabulate_undetermined(_list_undetermined(verdict, parameters)),
+        "untestable": tabulate_untestable(verdict.untestable),
         "found": [effect.name for effect in verdict.effects],
     }
 
@@ -204,10 +204,10 @@ def _list_undetermined(
         if parameter.shape
     }
     held = [name for name in verdict.held if name not in chosen_by_search]
-    return held + left_to_priors(parameters)
+    return held + find_prior_dominated(parameters)
 
 
-def cost_words(effect: Effect, heldout: HeldOut) -> str:
+def format_cost(effect: Effect, heldout: HeldOut) -> str:
     """Return the contribution of an effect in words.
 
     Its cost is the RMS error at the campaign's poses and loads if the effect alone were
@@ -227,11 +227,11 @@ def cost_words(effect: Effect, heldout: HeldOut) -> str:
             return "in no command"
         return "an error of the measurement, not of the robot"
     if cost_m > NEGLIGIBLE * heldout.after.rms_m:
-        return f"{say.millimetres(cost_m)} mm"
-    size = say.millimetres(cost_m)
+        return f"{say.format_millimetres(cost_m)} mm"
+    size = say.format_millimetres(cost_m)
     if cost_m < _COST_RESOLUTION_M / 2:
         # An effect that was found must not be printed as zero.
-        size = f"below {say.millimetres(_COST_RESOLUTION_M)}"
+        size = f"below {say.format_millimetres(_COST_RESOLUTION_M)}"
     certainty = "real, " if effect.probability >= _CERTAIN else ""
     return f"{size} mm: {certainty}negligible"
 
@@ -246,7 +246,7 @@ class _Cause:
     gain: float | None = None
 
 
-def cause_rows(verdict: Verdict) -> list[dict[str, Any]]:
+def tabulate_causes(verdict: Verdict) -> list[dict[str, Any]]:
     """Return what may be missing, the most probable cause first.
 
     Each row has the cause in words, its probability and, if it was found, its cost and
@@ -257,9 +257,9 @@ def cause_rows(verdict: Verdict) -> list[dict[str, Any]]:
         return []
     causes = [
         _Cause(
-            say.found_words(effect.name, effect.members),
+            say.format_found_effect(effect.name, effect.members),
             effect.probability,
-            cost_words(effect, verdict.heldout),
+            format_cost(effect, verdict.heldout),
             effect.heldout_gain,
         )
         for effect in verdict.missing_effects
@@ -267,13 +267,13 @@ def cause_rows(verdict: Verdict) -> list[dict[str, Any]]:
     causes += _list_other_causes(verdict)
     return [
         {
-            "name": say.capital(cause.name),
+            "name": say.capitalize_first(cause.name),
             "probability": cause.probability,
-            "words": say.probability_words(cause.probability),
+            "words": say.format_probability(cause.probability),
             "cost": cause.cost,
             "gain": ""
             if cause.gain is None
-            else say.minus(f"{-100 * cause.gain:+.0f} %"),
+            else say.set_minus(f"{-100 * cause.gain:+.0f} %"),
         }
         for cause in sorted(causes, key=lambda cause: -cause.probability)
     ]
@@ -283,21 +283,21 @@ def _list_other_causes(verdict: Verdict) -> list[_Cause]:
     """Return probable causes that are not part of the verdict, the most probable
     first."""
     assert verdict.probabilities is not None
-    found = {effect.name for effect in verdict.missing_effects}
-    # Together with a mechanism that was found, the competitor is a related mechanism.
-    competitor = say.RELATED if found else say.UNKNOWN
+    missing = {effect.name for effect in verdict.missing_effects}
+    # Together with a missing mechanism, the competitor is a related mechanism.
+    competitor = say.RELATED if missing else say.UNKNOWN
     causes = []
     for name, probability in verdict.probabilities.mechanisms.items():
-        if name not in found:
-            words = competitor if name == OTHER else say.physical_name(name)
-            causes.append(_Cause(words, probability))
+        if name not in missing:
+            cause = competitor if name == OTHER else say.name_effect(name)
+            causes.append(_Cause(cause, probability))
     causes.append(_Cause(say.NOTHING, verdict.probabilities.nothing))
     shown = [cause for cause in causes if cause.probability >= _MIN_SHOWN_PROBABILITY]
     shown.sort(key=lambda cause: -cause.probability)
     return shown[:_MAX_OTHER_CAUSES]
 
 
-def effect_facts(effect: Effect, heldout: HeldOut) -> dict[str, Any]:
+def describe_effect(effect: Effect, heldout: HeldOut) -> dict[str, Any]:
     """Return the facts of an effect.
 
     Parameters
@@ -312,40 +312,48 @@ def effect_facts(effect: Effect, heldout: HeldOut) -> dict[str, Any]:
     rows = [_effect_parameter_row(entry, effect.members) for entry in shown]
     locations = [
         (
-            say.location_words(effect.name, entry.location),
-            say.probability_words(entry.probability),
+            say.format_location(effect.name, entry.location),
+            say.format_probability(entry.probability),
         )
         for entry in effect.locations
         if entry.probability >= _MIN_SHOWN_PROBABILITY
     ]
-    alternatives = [say.alternative_words(name) for name in effect.alternatives]
+    alternatives = [say.format_alternative(name) for name in effect.alternatives]
+    left_out = ""
+    if len(identifiable) > len(shown):
+        left_out = format_integer(len(identifiable))
     return {
-        "name": say.capital(say.physical_name(effect.name)),
-        "found": say.found_words(effect.name, effect.members),
-        "bare": say.physical_name(effect.name),
+        "name": say.capitalize_first(say.name_effect(effect.name)),
+        "found": say.format_found_effect(effect.name, effect.members),
+        "bare": say.name_effect(effect.name),
         "catalogue": effect.name,
         "family": effect.family,
-        "description": say.as_sentence(description(effect.name)),
+        "description": say.format_sentence(summarize_effect(effect.name)),
         "locations": locations if len(effect.locations) > 1 else [],
         "unsure": _list_uncertain_locations(effect, locations),
         "parameters": rows,
         "with_prior": any(entry.prior_std for entry in shown),
-        "left_out": format_integer(len(identifiable))
-        if len(identifiable) > len(shown)
-        else "",
+        "left_out": left_out,
         "with_angle": any("q)" in row[0] for row in rows),
         "held": len(effect.parameters) - len(identifiable),
-        "probability": say.probability_words(effect.probability),
-        "cost": cost_words(effect, heldout),
+        "probability": say.format_probability(effect.probability),
+        "cost": format_cost(effect, heldout),
         "cost_m": effect.cost_m,
         "gain": effect.heldout_gain,
         "adopted": effect.adopted,
-        "alternatives": say.listed(alternatives, _MAX_NAMES) if alternatives else "",
-        "instead": say.listed(alternatives, _MAX_NAMES, last="or")
-        if alternatives
-        else "",
-        "common": say.in_common(effect.name, effect.alternatives),
+        "common": say.find_common_kind(effect.name, effect.alternatives),
         "evidence": [],
+        **_list_alternatives(alternatives),
+    }
+
+
+def _list_alternatives(alternatives: Sequence[str]) -> dict[str, str]:
+    """Return alternatives as lists with "and" and with "or"; empty if there are none."""
+    if not alternatives:
+        return {"alternatives": "", "instead": ""}
+    return {
+        "alternatives": say.join_items(alternatives, _MAX_NAMES),
+        "instead": say.join_items(alternatives, _MAX_NAMES, last="or"),
     }
 
 
@@ -372,63 +380,65 @@ def _select_parameters(parameters: list[EffectParameter]) -> list[EffectParamete
     return ranked[:_SHOWN_PARAMETERS]
 
 
-def fault_facts(fault: DataFault) -> dict[str, Any]:
-    """Return the facts of a fault of the data, with the keys of `effect_facts`."""
-    where = ""
+# Facts of an effect that a fault of the data does not have.
+_NO_EFFECT_FACTS = {
+    "catalogue": "",
+    "locations": [],
+    "unsure": [],
+    "with_prior": False,
+    "left_out": "",
+    "with_angle": False,
+    "held": 0,
+    "probability": "",
+    "cost": "",
+    "cost_m": None,
+    "gain": None,
+    "adopted": False,
+}
+
+
+def describe_fault(fault: DataFault) -> dict[str, Any]:
+    """Return the facts of a fault of the data, with the keys of `describe_effect`."""
+    name = say.capitalize_first(say.split_underscores(fault.name))
     if fault.joints:
         noun = pluralize("joint", len(fault.joints))
-        where = f" of {noun} {say.listed(map(str, fault.joints))}"
+        name += f" of {noun} {say.join_items(map(str, fault.joints))}"
     # RMS distance between measured and predicted positions, as written and with the
     # correction.
-    evidence = [value for value in fault.evidence if value is not None]
-    alternatives = fault.alternatives
+    evidence = []
+    if len(fault.evidence) == 2 and None not in fault.evidence:
+        evidence = [say.format_length(distance) for distance in fault.evidence]
     return {
-        "name": say.capital(say.words(fault.name)) + where,
-        "found": say.found_words(fault.name, ()),
-        "bare": say.physical_name(fault.name),
-        "catalogue": "",
+        **_NO_EFFECT_FACTS,
+        "name": name,
+        "found": say.format_found_effect(fault.name, ()),
+        "bare": say.name_effect(fault.name),
         "family": fault.family,
-        "description": say.as_sentence(fault.detail),
-        "locations": [],
-        "unsure": [],
+        "description": say.format_sentence(fault.detail),
         "parameters": [_fault_value_row(entry) for entry in fault.parameters],
-        "with_prior": False,
-        "left_out": "",
-        "with_angle": False,
-        "held": 0,
-        "probability": "",
-        "cost": "",
-        "cost_m": None,
-        "gain": None,
-        "adopted": False,
-        "alternatives": say.listed(alternatives, _MAX_NAMES) if alternatives else "",
-        "instead": say.listed(alternatives, _MAX_NAMES, last="or")
-        if alternatives
-        else "",
-        "common": say.in_common(fault.name, alternatives),
-        "evidence": [say.length(value) for value in evidence]
-        if len(evidence) == len(fault.evidence) == 2
-        else [],
+        "common": say.find_common_kind(fault.name, fault.alternatives),
+        "evidence": evidence,
+        **_list_alternatives(fault.alternatives),
     }
 
 
 def _format_interval(step: Mapping[str, Any]) -> str:
     """Return the RMS error of a step on validation poses with its 95 % interval, in one
     unit."""
-    factor, unit = say.unit_of(step["heldout_rms_m"])
-    text = say.plain(factor * step["heldout_rms_m"])
+    factor, unit = say.choose_length_unit(step["heldout_rms_m"])
+    text = say.format_number(factor * step["heldout_rms_m"])
     low = factor * step["heldout_rms_m_low"]
     high = factor * step["heldout_rms_m_high"]
     if np.isfinite([low, high]).all():
-        text += f" [{say.plain(low)}, {say.plain(high)}]"
+        text += f" [{say.format_number(low)}, {say.format_number(high)}]"
     return f"{text}\u00a0{unit}"
 
 
-def description(effect: str) -> str:
+def summarize_effect(effect: str) -> str:
     """Return what an effect of the catalogue is: the first line of its docstring,
     without the formula."""
     definition = list_effects().get(effect)
-    summary = say.words(effect)
+    summary = say.split_underscores(effect)
     if definition and definition.doc:
         summary = definition.doc.split("\n")[0]
     return re.sub(r", \w+\([^,]*=.*$", "", summary.split(":")[0]).rstrip(".")
@@ -443,11 +453,11 @@ def _effect_parameter_row(
     member = max(matching, key=len, default="")
     # A quantity of the whole effect, such as its largest sag, belongs to no member.
     owner = member or effect_of(members[0])
-    name = say.parameter_words(
+    name = say.name_parameter(
         effect_of(owner), parameter.name.removeprefix(f"{owner} ")
     )
     if member and len(members) > 1:
-        name = f"{say.place_words([member])}: {name}"
+        name = f"{say.format_places([member])}: {name}"
     source = ""
     if parameter.std_error:
         source = "measurements"
@@ -458,12 +468,12 @@ def _effect_parameter_row(
 
 def _fault_value_row(value: FaultValue) -> list[str]:
     """Return name, value and unit of a number that describes a fault of the data."""
-    return [say.words(value.name), *_format_value(value), ""]
+    return [say.split_underscores(value.name), *_format_value(value), ""]
 
 
 def _format_value(entry: EffectParameter | FaultValue) -> tuple[str, str]:
     """Return a value with its standard error, and its unit."""
-    number, unit = say.scaled(entry.value, entry.std_error, entry.unit)
+    number, unit = say.format_with_unit(entry.value, entry.std_error, entry.unit)
     if entry.unit == "–" and float(entry.value).is_integer():
         number = format_integer(int(entry.value))
     return number, unit
@@ -483,10 +493,10 @@ def _format_length(length: float, unit: str) -> str:
     """Return a length of a table: micrometres whole, millimetres with three decimals."""
     if unit == "mm":
         return f"{length:.3f}"
-    return say.minus(f"{length:.0f}") if np.isfinite(length) else ""
+    return say.set_minus(f"{length:.0f}") if np.isfinite(length) else ""
 
 
-def step_rows(
+def tabulate_steps(
     steps: Sequence[Mapping[str, Any]], floor_m: float | None
 ) -> dict[str, Any]:
     """Return the table of errors before and after, with its unit.
@@ -504,7 +514,7 @@ def step_rows(
         ``unit`` and ``rows``; each error is a list of lines: value, interval, multiple
         of the noise floor.
     """
-    factor, unit = say.unit_of(max(step["heldout_max_m"] for step in steps))
+    factor, unit = say.choose_length_unit(max(step["heldout_max_m"] for step in steps))
     rows = []
     for step in steps:
         cells = []
@@ -515,7 +525,7 @@ def step_rows(
             cells.append(cell)
         rows.append(
             {
-                "name": say.in_words(step["step"]),
+                "name": say.spell_out_names(step["step"]),
                 "kind": step["kind"],
                 "parameters": str(int(step["parameters"])),
                 "training": _format_length(factor * step["train_rms_m"], unit),
@@ -525,7 +535,7 @@ def step_rows(
     return {"unit": unit, "rows": rows}
 
 
-def experiment_facts(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def tabulate_experiment(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the table of the proposed states, with angles in degrees."""
     if not rows:
         return {"loaded": False, "heads": [], "rows": [], "points": ""}
@@ -538,19 +548,22 @@ def experiment_facts(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     for row in rows:
         cells = [f"{np.degrees(row[name]):.1f}" for name in angles]
         cells += [f"{round(row[name])}" for name in loads]
-        cells += [say.plain(row["separation"]), say.percent(row["resolved"])]
-        shown.append([say.minus(cell) for cell in cells])
+        cells += [
+            say.format_number(row["separation"]),
+            say.format_percent(row["resolved"]),
+        ]
+        shown.append([say.set_minus(cell) for cell in cells])
     heads = [f"{name} °" for name in angles]
     heads += [f"{name} {unit}" for name, unit in loads.items()]
     return {
         "loaded": bool(loads),
         "heads": [*heads, "separation", "resolved"],
         "rows": shown,
-        "points": say.listed(rows[0]["point"].split()),
+        "points": say.join_items(rows[0]["point"].split()),
     }
 
 
-def compliance_rows(compliances: Compliances) -> list[list[str]]:
+def tabulate_compliances(compliances: Compliances) -> list[list[str]]:
     """Return joint, compliance before, and after with its standard error; a compliance
     that is not identifiable has no number."""
     rows = []
@@ -565,27 +578,27 @@ def compliance_rows(compliances: Compliances) -> list[list[str]]:
                 numbers = [f"{before:.4g}", f"{after:.4g}"]
             rows.append([str(joint), *numbers])
             continue
-        estimate = say.pm(after, error)
+        estimate = say.format_estimate(after, error)
         decimals = len(estimate.rpartition(".")[2]) if "." in estimate else 0
         rows.append([str(joint), f"{before:.{decimals}f}", estimate])
     return rows
 
 
-def held_rows(held: Iterable[str]) -> list[list[str]]:
+def tabulate_undetermined(held: Iterable[str]) -> list[list[str]]:
     """Return the parameters that the measurements do not determine, one row for each
     owner."""
     names_by_owner: dict[str, list[str]] = {}
     for key in held:
         owner, _, parameter = key.rpartition(" ")
-        words = say.parameter_words(effect_of(owner), parameter)
-        names_by_owner.setdefault(owner, []).append(words)
+        name = say.name_parameter(effect_of(owner), parameter)
+        names_by_owner.setdefault(owner, []).append(name)
     return [
-        [say.capital(say.candidate_words(owner)), ", ".join(names)]
+        [say.capitalize_first(say.format_candidate(owner)), ", ".join(names)]
         for owner, names in names_by_owner.items()
     ]
 
 
-def left_to_priors(parameters: Mapping[str, np.ndarray]) -> list[str]:
+def find_prior_dominated(parameters: Mapping[str, np.ndarray]) -> list[str]:
     """Return the parameters about which the measurements say hardly more than their
     priors: owner and name."""
     is_wide = parameters["std_error"] > MOSTLY_PRIOR * parameters["prior_std"]
@@ -595,18 +608,18 @@ def left_to_priors(parameters: Mapping[str, np.ndarray]) -> list[str]:
     return [f"{owner} {name}" for owner, name in zip(owners, names, strict=True)]
 
 
-def untestable_rows(untestable: Mapping[str, str]) -> list[list[str]]:
+def tabulate_untestable(untestable: Mapping[str, str]) -> list[list[str]]:
     """Return the candidates that were not tested, one row for each effect and reason."""
     keys_by_cause: dict[tuple[str, str], list[str]] = {}
     for key, reason in untestable.items():
-        words = reason.replace("no approach", "no direction of approach")
-        keys_by_cause.setdefault((effect_of(key), words), []).append(key)
+        cause = reason.replace("no approach", "no direction of approach")
+        keys_by_cause.setdefault((effect_of(key), cause), []).append(key)
     rows = []
     for (effect, reason), keys in keys_by_cause.items():
-        locations = say.place_words(keys)
+        locations = say.format_places(keys)
         if len(locations) > _MAX_LOCATION_LETTERS:
-            first = say.place_words(keys[:_SHOWN_LOCATIONS])
+            first = say.format_places(keys[:_SHOWN_LOCATIONS])
             locations = f"{first} and {len(keys) - _SHOWN_LOCATIONS} more"
-        name = say.capital(say.physical_name(effect))
+        name = say.capitalize_first(say.name_effect(effect))
         rows.append([name, locations or "–", reason])
     return sorted(rows, key=lambda row: (row[2], row[0]))

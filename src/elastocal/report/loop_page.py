@@ -11,7 +11,7 @@ import numpy as np
 from markupsafe import Markup
 
 from elastocal.io.atomic_writes import write_text
-from elastocal.loop.schemas import angles_of, worst_measurement
+from elastocal.loop.schemas import find_worst_measurement, stack_joint_angles
 from elastocal.mechanics.kinematics import locate_corners, locate_joint_axes
 from elastocal.report import words as say
 from elastocal.report.typesetting import load_template
@@ -32,7 +32,7 @@ _ARROW_SHARE = 0.03
 _STAGES = ("before", "after")
 
 
-def loop_page(
+def build_loop_page(
     facts: Mapping[str, Any], table: Mapping[str, np.ndarray], robot: Robot
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return what the page of a campaign states, and what it draws.
@@ -40,7 +40,7 @@ def loop_page(
     Parameters
     ----------
     facts : mapping
-        As `loop_facts.loop_facts` returns them.
+        As `loop_facts.collect_loop_facts` returns them.
     table : mapping of (N,) arrays
         Columns of the residuals; joint angles are those of the model, not those of the
         controller.
@@ -86,7 +86,7 @@ def _select_measurements(table: Mapping[str, np.ndarray]) -> np.ndarray:
     if count <= _MAX_MEASUREMENTS:
         return np.arange(count)
     spread = _spread(count, _MAX_MEASUREMENTS - 1)
-    return np.unique([*spread, worst_measurement(table)])
+    return np.unique([*spread, find_worst_measurement(table)])
 
 
 def _draw_poses(selection: Mapping[str, np.ndarray], robot: Robot) -> dict[str, Any]:
@@ -102,12 +102,12 @@ def _draw_poses(selection: Mapping[str, np.ndarray], robot: Robot) -> dict[str, 
         keys, axis=0, return_index=True, return_inverse=True
     )
     pose_of_row = inverse.ravel()
-    worst_pose = pose_of_row[worst_measurement(selection)]
+    worst_pose = pose_of_row[find_worst_measurement(selection)]
     in_order = np.argsort(first_rows)
     worst_place = np.flatnonzero(in_order == worst_pose)[0]
     drawn = in_order[np.unique([*_spread(len(first_rows), _MAX_POSES), worst_place])]
     rows = first_rows[drawn]
-    angles = angles_of(selection, robot.joints)[rows]
+    angles = stack_joint_angles(selection, robot.joints)[rows]
     outlines = locate_corners(robot.chain, angles).swapaxes(0, 1)
     axes = np.moveaxis(locate_joint_axes(robot.chain, angles), 2, 0)
     return {
@@ -191,7 +191,7 @@ def _list_quantities(
     selection: Mapping[str, np.ndarray], robot: Robot
 ) -> list[dict[str, Any]]:
     """Return the quantities that vary, to plot residuals against."""
-    angles = angles_of(selection, robot.joints)
+    angles = stack_joint_angles(selection, robot.joints)
     quantities = []
     for joint, is_prismatic in enumerate(robot.chain.prismatic):
         if is_prismatic:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _MAX_TARGETS = 12
 
 
-def measured_rows(
+def tabulate_measured(
     table: Mapping[str, np.ndarray], descriptions: Mapping[str, Any]
 ) -> list[list[str]]:
     """Return rows of what was measured: name, at fitted poses, at validation poses.
@@ -96,11 +96,11 @@ def _describe_loads(table: Mapping[str, np.ndarray]) -> str:
     loaded = force[force > 0]
     if not len(loaded):
         return "none"
-    size = say.plain(loaded.min())
+    size = say.format_number(loaded.min())
     if not np.isclose(loaded.min(), loaded.max(), rtol=1e-3):
-        size += f" to {say.plain(loaded.max())}"
+        size += f" to {say.format_number(loaded.max())}"
     loads = format_count(len(np.unique(table["load"][force > 0])), "load")
-    share = say.percent(len(loaded) / len(force))
+    share = say.format_percent(len(loaded) / len(force))
     return f"{loads} of {size} N on {share} of the measurements"
 
 
@@ -112,13 +112,13 @@ def _describe_targets(
 ) -> str:
     """Return the targets that were measured, with their measuring points and mounts."""
     targets = list(campaign["targets"].items())
-    words = []
+    descriptions = []
     for index in np.unique(table["target"]):
         name, target = targets[index]
         prefix = "" if name == target["point"] else f"{name} "
         mount = _describe_mount(target, has_orientations=has_orientations)
-        words.append(f"{prefix}at the measuring point {target['point']}{mount}")
-    return say.listed(words, _MAX_TARGETS)
+        descriptions.append(f"{prefix}at the measuring point {target['point']}{mount}")
+    return say.join_items(descriptions, _MAX_TARGETS)
 
 
 def _describe_mount(target: Mapping[str, Any], *, has_orientations: bool) -> str:

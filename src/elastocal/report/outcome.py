@@ -24,7 +24,7 @@ _REPORTS = {
 }
 
 
-def outcome(made: Iterable[str], workplace: str | Path = "") -> list[str]:
+def describe_outcome(made: Iterable[str], workplace: str | Path = "") -> list[str]:
     """Return lines about the reports among the files that a run has made.
 
     Parameters
@@ -51,9 +51,9 @@ def outcome(made: Iterable[str], workplace: str | Path = "") -> list[str]:
 def _describe_campaign(name: str, verdict: Verdict) -> list[str]:
     """Return the verdict on a campaign and its errors."""
     # Import the templates only here, because a run without a report does not need them.
-    from elastocal.report.loop_facts import campaign_sentences
+    from elastocal.report.loop_facts import render_campaign_sentences
 
-    stated = campaign_sentences(verdict)
+    stated = render_campaign_sentences(verdict)
     mark = "✓" if _is_correctable(verdict) else "!"
     return [
         f"{mark} {name}: {stated['sentences'][0]}",

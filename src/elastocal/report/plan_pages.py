@@ -23,7 +23,7 @@ _UNITS = {"deg": "°", "mm": "mm"}
 _LOAD_NAMES = {0.0: "0", 1.0: "+F", -1.0: "−F"}
 
 
-def plan_facts(
+def collect_plan_facts(
     survey: Survey, plan: Plan, rows: pd.DataFrame, worth: Sequence[str]
 ) -> dict[str, Any]:
     """Return what the sheet of a plan shows.
@@ -58,10 +58,10 @@ def plan_facts(
     heads += [f"F{name[1]} (N)" for name in force_columns]
     poses = [
         {
-            "cells": _format_pose(pose, part, angle_columns, force_columns),
-            "visits": _count_visits(survey, part),
+            "cells": _format_pose(pose, measurements, angle_columns, force_columns),
+            "visits": _count_visits(survey, measurements),
         }
-        for pose, part in rows.groupby("pose")
+        for pose, measurements in rows.groupby("pose")
     ]
     fitted = len(plan.fitted.joint_angles)
     return {
@@ -82,24 +82,25 @@ def plan_facts(
 
 def _format_pose(
     pose: object,
-    part: pd.DataFrame,
+    measurements: pd.DataFrame,
     angle_columns: Sequence[str],
     force_columns: Sequence[str],
 ) -> list[str]:
     """Return number, joint coordinates and full force of a pose as cells."""
     cells = [str(pose)]
-    cells += [f"{part[name].iloc[0]:.2f}" for name in angle_columns]
+    cells += [f"{measurements[name].iloc[0]:.2f}" for name in angle_columns]
     # Load 1 is the full force; adding zero removes the sign of a negative zero.
-    full_load = part[part["load"] == 1]
+    full_load = measurements[measurements["load"] == 1]
     cells += [f"{round(full_load[name].iloc[0]) + 0:d}" for name in force_columns]
     return cells
 
 
-def _count_visits(survey: Survey, part: pd.DataFrame) -> list[dict[str, Any]]:
+def _count_visits(survey: Survey, measurements: pd.DataFrame) -> list[dict[str, Any]]:
     """Return how often a pose is measured under each load."""
     visits = []
     for load, share in enumerate(survey.shares):
-        count = part.loc[part["load"] == load, "repeat"].nunique()
+        is_loaded = measurements["load"] == load
+        count = measurements.loc[is_loaded, "repeat"].nunique()
         if count:
             visits.append({"load": _LOAD_NAMES[share], "count": int(count)})
     return visits

@@ -67,9 +67,9 @@ def render_sentences(
     rendered = load_template(name, filters).render(facts)
     for marks, heading, text in _SECTION.findall(rendered):
         is_table = marks == "##"
-        parts = re.split(r"\n" if is_table else _EMPTY_LINES, text)
-        stripped = [part.strip(" \n") for part in parts]
-        stated = [re.sub(r"[ \n]+", " ", part) for part in stripped if part]
+        blocks = re.split(r"\n" if is_table else _EMPTY_LINES, text)
+        stripped = [block.strip(" \n") for block in blocks]
+        stated = [re.sub(r"[ \n]+", " ", block) for block in stripped if block]
         if is_table:
             sections[heading] = [_split_cells(line) for line in stated]
         else:

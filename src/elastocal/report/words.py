@@ -1,8 +1,8 @@
-"""Effects, locations, hypotheses, numbers and units as a robot engineer writes them:
+"""Write effects, locations, hypotheses, numbers and units as a robot engineer does:
 gravity sag of joint 2, 117.6 ± 3.6 µrad.
 
-Each effect of the catalogue brings its own words; nothing here knows one by name.
-Sentences stand in templates, which have the functions of this module as filters.
+The names of effects come from the catalogue. The functions of this module are filters of
+the templates that have the sentences.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ MILLI = 1e3
 NOTHING = "nothing is missing"
 UNKNOWN = "something that the catalogue does not have"
 RELATED = "a related mechanism"
-# A blank at which no line ends.
+# A blank without a line break.
 _TIED = "\u00a0"
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _KEY = r"(?P<effect>{names})(?:@(?P<joints>\d+(?:\+\d+)*))?(?:\[(?P<detail>[^\]]*)\])?"
@@ -36,7 +36,7 @@ _ANY_KEY = re.compile(_KEY.format(names=r"[^@\[]+") + "$")
 _LOCATION = re.compile(
     r"^(?:(?P<kind>joint|link)s? (?P<joints>\d+(?: and \d+)*))? ?(?P<detail>.*)$"
 )
-# What names of parameters are short for.
+# Patterns in the names of parameters, and their words.
 _PARAMETER_WORDS = (
     (r"^d([xyz])$", r"shift along \1"),
     (r"^r([xyz])$", r"rotation about \1"),
@@ -49,7 +49,7 @@ _PARAMETER_WORDS = (
     (r"\bmoment\b", "first moment"),
     (r"\b1 over ([EG])([IJ])\b", r"1/(\1\2)"),
 )
-# What the mechanisms of a family have in common.
+# Common kind of the mechanisms of a family.
 _IN_COMMON = {
     "elastic": "yielding",
     "geometry": "an error of geometry",
@@ -59,20 +59,22 @@ _IN_COMMON = {
     "load": "an error of the load",
     "drift": "drift of the set-up or by warmth",
 }
-# Parts of a robot that stand in a location in the place of a joint.
+# Parts of a robot that a location may name instead of a joint.
 _PARTS = ("column", "base")
+# From here on a length, rounded to three digits in µm, is a millimetre.
+_ROUNDS_TO_MM = 0.9995e-3
 # Upper bound on the locations that are listed with details, such as bands of orders; of
 # more locations only the joints are listed.
 _MAX_DETAILED = 2
 
 
-def physical_name(effect: str) -> str:
+def name_effect(effect: str) -> str:
     """Return the physical name of an effect; an effect that the catalogue does not have
     is called by its own name."""
-    return getattr(list_effects().get(effect), "words", words(effect))
+    return getattr(list_effects().get(effect), "words", split_underscores(effect))
 
 
-def parameter_words(effect: str, name: str) -> str:
+def name_parameter(effect: str, name: str) -> str:
     """Return a parameter as an engineer would call it: shift along x for dx, cos(2q) for
     cos_2q.
 
@@ -85,51 +87,53 @@ def parameter_words(effect: str, name: str) -> str:
         Name of the parameter.
     """
     own_words = getattr(list_effects().get(effect), "parameter_words", {})
-    text = own_words.get(name, words(name))
+    text = own_words.get(name, split_underscores(name))
     for pattern, replacement in _PARAMETER_WORDS:
         text = re.sub(pattern, replacement, text)
     return text
 
 
-def effect_words(effect: str, locations: Iterable[str] = ()) -> str:
+def format_located_effect(effect: str, locations: Iterable[str] = ()) -> str:
     """Return an effect with its locations as verdict.json has them: gravity sag of
     joints 2 and 3."""
-    return physical_name(effect) + _format_locations(
+    return name_effect(effect) + _format_locations(
         effect, map(_LOCATION.match, locations)
     )
 
 
-def found_words(effect: str, keys: Iterable[str]) -> str:
+def format_found_effect(effect: str, keys: Iterable[str]) -> str:
     """Return an effect with the locations of its candidates, which keys give."""
-    return physical_name(effect) + _format_locations(effect, map(_ANY_KEY.match, keys))
+    return name_effect(effect) + _format_locations(effect, map(_ANY_KEY.match, keys))
 
 
-def candidate_words(key: str) -> str:
+def format_candidate(key: str) -> str:
     """Return the key of a candidate in words: zero offset of joint 3, gear transmission
     error of joint 1 (orders 1-2)."""
     match = _ANY_KEY.match(key)
-    return found_words(match["effect"], [key]) if match else words(key)
+    return (
+        format_found_effect(match["effect"], [key]) if match else split_underscores(key)
+    )
 
 
-def location_words(effect: str, location: str) -> str:
+def format_location(effect: str, location: str) -> str:
     """Return a location without its effect: links 1, 2 and 3 (one section)."""
     text = _format_locations(effect, [_LOCATION.match(location)])
     return text.removeprefix(" of ").strip() or "the whole robot"
 
 
-def place_words(keys: Sequence[str]) -> str:
+def format_places(keys: Sequence[str]) -> str:
     """Return the locations of candidates of one effect without its name: joints 2 and 3;
     empty if they have none."""
     text = _format_locations(effect_of(keys[0]), map(_ANY_KEY.match, keys))
     return text.removeprefix(" of ").strip()
 
 
-def at_joints(effect: str, joints: Collection[int]) -> str:
+def format_joints(effect: str, joints: Collection[int]) -> str:
     """Return the joints or links of an effect, " of joint 3"; empty without joints."""
     if not joints:
         return ""
     noun = getattr(list_effects().get(effect), "part", "joint")
-    return f" of {pluralize(noun, len(joints))} {listed(map(str, joints))}"
+    return f" of {pluralize(noun, len(joints))} {join_items(map(str, joints))}"
 
 
 def _format_locations(effect: str, matches: Iterable[re.Match[str] | None]) -> str:
@@ -150,13 +154,13 @@ def _format_locations(effect: str, matches: Iterable[re.Match[str] | None]) -> s
         if match["detail"]:
             details.append(match["detail"])
     if _can_list_joints_alone(details_by_joints):
-        return at_joints(effect, sorted(joints[0] for joints in details_by_joints))
+        return format_joints(effect, sorted(joints[0] for joints in details_by_joints))
     in_list = len(details_by_joints) > 1
     locations = [
-        _format_location(effect, joints, ", ".join(details), in_list=in_list)
+        _format_single_location(effect, joints, ", ".join(details), in_list=in_list)
         for joints, details in details_by_joints.items()
     ]
-    return f" {listed(locations)}" if any(locations) else ""
+    return f" {join_items(locations)}" if any(locations) else ""
 
 
 def _can_list_joints_alone(
@@ -170,14 +174,14 @@ def _can_list_joints_alone(
     return count > _MAX_DETAILED or not any(details_by_joints.values())
 
 
-def _format_location(
+def _format_single_location(
     effect: str, joints: tuple[int, ...], detail: str, *, in_list: bool
 ) -> str:
     """Return one location with its detail: of joint 4 (orders 1-2)."""
     detail = getattr(list_effects().get(effect), "detail_words", {}).get(detail, detail)
     if not joints and detail in _PARTS:
         return f"of the {detail}"
-    location = at_joints(effect, joints)
+    location = format_joints(effect, joints)
     # A location without joints needs words only in a list with other locations.
     if not joints and in_list:
         location = " of the whole arm"
@@ -186,7 +190,7 @@ def _format_location(
     return location.strip()
 
 
-def hypotheses_words(sets: Sequence[MechanismSet]) -> list[str]:
+def format_hypotheses(sets: Sequence[MechanismSet]) -> list[str]:
     """Return hypotheses in words, the most probable one first.
 
     A hypothesis that contains all mechanisms of the first one is described by what it
@@ -202,93 +206,100 @@ def hypotheses_words(sets: Sequence[MechanismSet]) -> list[str]:
             hypotheses.append(NOTHING)
         elif not first or not first < names:
             hypotheses.append(
-                mechanisms_words(hypothesis.mechanisms, hypothesis.locations)
+                format_mechanisms(hypothesis.mechanisms, hypothesis.locations)
             )
         elif added == {OTHER}:
             hypotheses.append(f"the same or {RELATED}")
         else:
-            words = mechanisms_words(sorted(added), hypothesis.locations)
-            hypotheses.append(f"the same with {words}")
+            addition = format_mechanisms(sorted(added), hypothesis.locations)
+            hypotheses.append(f"the same with {addition}")
     return hypotheses
 
 
-def mechanisms_words(
+def format_mechanisms(
     names: Collection[str], locations: Mapping[str, Iterable[str]] = {}
 ) -> str:
-    """A set of mechanisms with their locations, where these are stated."""
-    named = [
-        effect_words(name, locations.get(name, ())) for name in names if name != OTHER
-    ]
-    return " with ".join(named) + (
-        f" or {RELATED}" if named and OTHER in names else "" if named else UNKNOWN
-    )
+    """Return a set of mechanisms in words.
 
-
-def alternative_words(name: str) -> str:
-    """What may be meant instead of a mechanism: another, or a related one."""
-    return RELATED if name == OTHER else physical_name(name)
-
-
-def in_common(effect: str, alternatives: Iterable[str]) -> str:
-    """What an effect and all that may be meant instead have in common, as people call
-    it: yielding; empty of no one kind.
-
-    What the catalogue does not have may be of any.
+    Parameters
+    ----------
+    names : collection of str
+        Effects of the catalogue, and `OTHER`.
+    locations : mapping of iterables of str
+        Locations of some of the effects.
     """
-    families = {
-        getattr(list_effects().get(name), "family", "")
-        for name in (effect, *alternatives)
-    }
-    kinds = {_IN_COMMON.get(family, "") for family in families}
+    effects = [
+        format_located_effect(name, locations.get(name, ()))
+        for name in names
+        if name != OTHER
+    ]
+    if not effects:
+        return UNKNOWN
+    text = " with ".join(effects)
+    return f"{text} or {RELATED}" if OTHER in names else text
+
+
+def format_alternative(name: str) -> str:
+    """Return what may be meant instead of a mechanism: another, or a related one."""
+    return RELATED if name == OTHER else name_effect(name)
+
+
+def find_common_kind(effect: str, alternatives: Iterable[str]) -> str:
+    """Return what an effect and its alternatives have in common, such as "yielding".
+
+    The result is empty if they are of several kinds, or if one of them is not in the
+    catalogue, because it may be of any kind.
+    """
+    kinds = set()
+    for name in (effect, *alternatives):
+        family = getattr(list_effects().get(name), "family", "")
+        kinds.add(_IN_COMMON.get(family, ""))
     return kinds.pop() if len(kinds) == 1 else ""
 
 
-def in_words(text: str) -> str:
-    """A text with every name of the catalogue, every key of a candidate and the
-    parameter stated after it in words."""
+def spell_out_names(text: str) -> str:
+    """Return a text with names of the catalogue, keys of candidates and the parameters
+    stated after them in words."""
     names = "|".join(sorted(list_effects(), key=len, reverse=True))
 
-    def worded(found: re.Match[str]) -> str:
-        # Names that are common words, such as payload, are meant only as keys or where
-        # something is stated of them.
-        stands_alone = not (
-            found["joints"]
-            or found["detail"]
-            or text[found.end("key") :].startswith(":")
-        )
-        if "_" not in found["effect"] and stands_alone:
-            return found.group()
-        stated = (
-            f": {parameter_words(found['effect'], found['parameter'])} is "
-            if found["parameter"]
-            else ""
-        )
-        return candidate_words(found["key"]) + stated
+    def spell_out(match: re.Match[str]) -> str:
+        # Names that are common words, such as payload, are meant only as keys or if the
+        # text states something about them.
+        is_key = match["joints"] or match["detail"]
+        is_common_word = "_" not in match["effect"] and not is_key
+        if is_common_word and not text[match.end("key") :].startswith(":"):
+            return match.group()
+        candidate = format_candidate(match["key"])
+        if not match["parameter"]:
+            return candidate
+        return f"{candidate}: {name_parameter(match['effect'], match['parameter'])} is "
 
     key = r"(?<![\w@])(?P<key>" + _KEY.format(names=names) + r")(?!\w)"
-    return re.sub(key + r"(?:: (?P<parameter>\w+) is )?", worded, text)
+    return re.sub(key + r"(?:: (?P<parameter>\w+) is )?", spell_out, text)
 
 
-def words(name: str) -> str:
-    """A name of the catalogue or of a parameter as words."""
+def split_underscores(name: str) -> str:
+    """Return a name of the catalogue or of a parameter as words."""
     return name.replace("_", " ")
 
 
-def listed(items: Iterable[str], most: int | None = None, last: str = "and") -> str:
+def join_items(
+    items: Iterable[str], limit: int | None = None, last: str = "and"
+) -> str:
     """Return items as they stand in a sentence.
 
     Parameters
     ----------
     items : iterable of str
         The items.
-    most : int, optional
-        Upper bound on their number; the others are counted.
+    limit : int, optional
+        Upper bound on the items that are named; the others are counted.
     last : str
         Word before the last item.
     """
     shown = list(items)
-    if most is not None and len(shown) > most:
-        shown = [*shown[:most], f"{len(shown) - most} more"]
+    if limit is not None and len(shown) > limit:
+        shown = [*shown[:limit], f"{len(shown) - limit} more"]
     if not shown:
         return "none"
     if len(shown) == 1:
@@ -296,28 +307,28 @@ def listed(items: Iterable[str], most: int | None = None, last: str = "and") -> 
     return f"{', '.join(shown[:-1])} {last} {shown[-1]}"
 
 
-def capital(text: str) -> str:
-    """A text with a capital at its beginning."""
+def capitalize_first(text: str) -> str:
+    """Return a text with a capital first letter."""
     return text[:1].upper() + text[1:]
 
 
-def as_sentence(text: str) -> str:
-    """A text with a capital and a full stop."""
-    text = text.strip()
-    return capital(text) + ("" if text.endswith(".") else ".")
+def format_sentence(text: str) -> str:
+    """Return a text with a capital first letter and a full stop."""
+    sentence = capitalize_first(text.strip())
+    return sentence if sentence.endswith(".") else f"{sentence}."
 
 
-def minus(text: str) -> str:
-    """A number with a true minus sign."""
+def set_minus(text: str) -> str:
+    """Return a number with a typographic minus sign for its hyphen."""
     return text.replace("-", "−")
 
 
-def true_minus(text: str) -> str:
-    """A sentence whose numbers have a true minus sign."""
+def set_minus_in_sentence(text: str) -> str:
+    """Return a sentence with typographic minus signs in its numbers."""
     return re.sub(r"(?<= )-(?=\d)", "−", text)
 
 
-def span_words(joint_ranges: Sequence[JointRange]) -> str:
+def format_joint_ranges(joint_ranges: Sequence[JointRange]) -> str:
     """Return the range of each joint in words."""
     ranges = []
     for joint, ends in enumerate(joint_ranges, 1):
@@ -325,67 +336,70 @@ def span_words(joint_ranges: Sequence[JointRange]) -> str:
             text = f"joint {joint} {ends.low:.0f} to {ends.high:.0f}°"
         else:
             text = f"joint {joint} {ends.low:.2f} to {ends.high:.2f} m"
-        ranges.append(minus(text))
+        ranges.append(set_minus(text))
     return ", ".join(ranges)
 
 
-def unit_of(metres: float) -> tuple[float, str]:
-    """Unit in which a length is shown, with how many of them a metre has: µm below one
-    millimetre."""
-    return (MICRO, "µm") if abs(metres) < 0.9995e-3 else (MILLI, "mm")
+def choose_length_unit(metres: float) -> tuple[float, str]:
+    """Return how many units a metre has, and the unit: µm below one millimetre, else
+    mm."""
+    return (MICRO, "µm") if abs(metres) < _ROUNDS_TO_MM else (MILLI, "mm")
 
 
-def length(metres: float | None, digits: int = 3) -> str:
-    """A length with its unit, µm below one millimetre; "unknown" where there is
-    none."""
+def format_length(metres: float | None, digits: int = 3) -> str:
+    """Return a length with its unit; "unknown" for None."""
     if metres is None:
         return "unknown"
-    factor, unit = unit_of(metres)
-    return f"{plain(factor * metres, digits)}{_TIED}{unit}"
+    factor, unit = choose_length_unit(metres)
+    return f"{format_number(factor * metres, digits)}{_TIED}{unit}"
 
 
-def millimetres(metres: float) -> str:
-    """A length without its unit in mm: three digits, and none finer than a
+def format_millimetres(metres: float) -> str:
+    """Return a length in mm without its unit, with three digits but none below a
     micrometre."""
-    return (
-        plain(MILLI * metres) if abs(metres) >= 0.9995e-3 else f"{MILLI * metres:.3f}"
-    )
+    millimetres = MILLI * metres
+    if abs(metres) < _ROUNDS_TO_MM:
+        return f"{millimetres:.3f}"
+    return format_number(millimetres)
 
 
-def microradians(radians: float) -> str:
-    """An angle in µrad, with its unit."""
-    return f"{plain(MICRO * radians)} µrad"
+def format_microradians(radians: float) -> str:
+    """Return an angle in µrad with its unit."""
+    return f"{format_number(MICRO * radians)} µrad"
 
 
-def pm(value: float, error: float) -> str:
-    """A number ± its standard error, of which two digits are given."""
+def format_estimate(value: float, error: float) -> str:
+    """Return a number ± its standard error, of which two digits are given."""
     decimals = max(0, 1 - int(np.floor(np.log10(error))))
-    # What is rounded to zero has no sign.
-    return minus(f"{round(value, decimals) + 0.0:.{decimals}f} ± {error:.{decimals}f}")
+    # Adding zero removes the sign of a value that is rounded to zero.
+    rounded = round(value, decimals) + 0.0
+    return set_minus(f"{rounded:.{decimals}f} ± {error:.{decimals}f}")
 
 
-def plain(value: float, digits: int = 3) -> str:
-    """A number with so many significant digits and without an exponent."""
+def format_number(value: float, digits: int = 3) -> str:
+    """Return a number with so many significant digits and without an exponent."""
     if value == 0:
         return "0"
-    # Rounded first: what rounds up to the next power of ten has one decimal less.
+    # Round first: a value that rounds up to the next power of ten has one decimal less.
     power = int(f"{value:.{digits - 1}e}".split("e")[1])
     return f"{value:.{max(0, digits - 1 - power)}f}"
 
 
-def percent(share: float) -> str:
-    """A share in percent."""
+def format_percent(share: float) -> str:
+    """Return a share in percent."""
     return f"{100 * share:.0f}{_TIED}%"
 
 
-def probability_words(probability: float) -> str:
-    """A probability in whole percent; none is given as 0 or 100 %."""
+def format_probability(probability: float) -> str:
+    """Return a probability in whole percent; none is given as 0 or 100 %."""
     if probability < 0.005:
         return f"<{_TIED}1{_TIED}%"
-    return f">{_TIED}99{_TIED}%" if probability >= 0.995 else percent(probability)
+    if probability >= 0.995:
+        return f">{_TIED}99{_TIED}%"
+    return format_percent(probability)
 
 
-def scaled(value: float, error: float | None, unit: str) -> tuple[str, str]:
+def format_with_unit(value: float, error: float | None, unit: str) -> tuple[str, str]:
     """Return a value with its standard error, and the unit that suits it.
 
     Parameters
@@ -409,7 +423,11 @@ def scaled(value: float, error: float | None, unit: str) -> tuple[str, str]:
         power = int(np.floor(np.log10(size)))
     number = number / 10.0**power
     std_error = std_error / 10.0**power
-    text = pm(number, std_error) if std_error else minus(plain(number, 4))
+    text = (
+        format_estimate(number, std_error)
+        if std_error
+        else set_minus(format_number(number, 4))
+    )
     if power:
         mantissa = f"({text})" if std_error else text
         text = f"{mantissa} · 10{str(power).translate(_SUPERSCRIPTS)}"

@@ -74,7 +74,7 @@ _REPLICATES = 1000
 _BESIDE = 0.05
 # A usual size of an effect is as easily taken back as so much of a joint is added.
 _RAD_OF_A_SIZE = 1e-3
-# What no command states, as `effects.conditions.offered` names it.
+# What no command states, as `effects.conditions.find_offered_needs` names it.
 _NOT_STATED = {"approach", "time", "temperature"}
 
 

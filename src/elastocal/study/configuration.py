@@ -10,7 +10,7 @@ from typing import Any
 from elastocal.errors import InputError
 from elastocal.io.documents import (
     check_document,
-    document_path,
+    locate_document,
     parse_yaml,
     read_named_document,
 )
@@ -74,14 +74,14 @@ def check_study(
         for name in config["robots"]
     }
     for name, robot in robots.items():
-        _check_simulation_keys(robot, document_path(folder, "robots", name))
+        _check_simulation_keys(robot, locate_document(folder, "robots", name))
     documents = {
         name: read_named_document(folder, "strategies", "strategy", name, source)
         for name in config["strategies"]
     }
     _check_distinct_names(documents, folder)
     chains = {
-        name: parse_robot(robot, document_path(folder, "robots", name)).chain
+        name: parse_robot(robot, locate_document(folder, "robots", name)).chain
         for name, robot in robots.items()
     }
     strategies = {
@@ -89,7 +89,7 @@ def check_study(
     }
     for name, strategy in strategies.items():
         for chain in chains.values():
-            check_strategy(strategy, chain, document_path(folder, "strategies", name))
+            check_strategy(strategy, chain, locate_document(folder, "strategies", name))
         _check_length(strategy, config, source)
     if all("links" in robot for robot in robots.values()):
         raise InputError(
@@ -130,7 +130,7 @@ def _check_distinct_names(
         first = files.setdefault(document["name"], file)
         if first != file:
             raise InputError(
-                document_path(folder, "strategies", file),
+                locate_document(folder, "strategies", file),
                 "name",
                 f"{document['name']!r}, as of {first}",
                 "a name of its own: tables go by it",

@@ -148,10 +148,10 @@ def find_undetermined_prefixes(
 
     References
     ----------
-    [1] Driels, M. R. and Pathre, U. S., Significance of observation strategy on the
-    design of robot calibration experiments, Journal of Robotic Systems 7, 1990.
-    [2] Guggenheimer, H. W., Edelman, A. S. and Johnson, C. R., A simple estimate of the
-    condition number of a linear system, College Mathematics Journal 26, 1995.
+    .. [1] Driels, M. R. and Pathre, U. S., Significance of observation strategy on the
+       design of robot calibration experiments, Journal of Robotic Systems 7, 1990.
+    .. [2] Guggenheimer, H. W., Edelman, A. S. and Johnson, C. R., A simple estimate of the
+       condition number of a linear system, College Mathematics Journal 26, 1995.
     """
     undetermined: np.ndarray = np.zeros((), bool)
     for stage, triangle in zip(strategy.stages, triangles, strict=True):
@@ -196,8 +196,8 @@ def factorize_prefixes(
 
     References
     ----------
-    [1] Lawson, C. L. and Hanson, R. J., Solving Least Squares Problems, Prentice-Hall,
-    1974.
+    .. [1] Lawson, C. L. and Hanson, R. J., Solving Least Squares Problems, Prentice-Hall,
+       1974.
     """
     triangles = np.empty(shape)
     previous = np.zeros(shape[1:])

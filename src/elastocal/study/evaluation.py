@@ -253,8 +253,8 @@ def average_estimates(
 
     References
     ----------
-    [1] Owen, A. B. and Eckles, D., Bootstrapping data arrays of arbitrary order, Annals
-    of Applied Statistics 6, 2012.
+    .. [1] Owen, A. B. and Eckles, D., Bootstrapping data arrays of arbitrary order, Annals
+       of Applied Statistics 6, 2012.
     """
     total_weight: Any = 0.0
     weighted_sum: Any = 0.0
@@ -631,9 +631,9 @@ def repeat_studies(job: Job) -> None:
 
 def tabulate_studies(job: Job) -> None:
     """Write Table 4 over studies."""
-    from elastocal.io.data_frames import read_long
+    from elastocal.io.data_frames import read_robot_tables
 
     params = job.params
-    studies = read_long(job.input.studies, make_repeated_schema)
+    studies = read_robot_tables(job.input.studies, make_repeated_schema)
     table = build_over_studies_table(studies, params.length, params.limits)
     write_csvs(job, table=add_slugs(table, params.slugs))

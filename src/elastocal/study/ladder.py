@@ -8,10 +8,10 @@ forward selection [2]; configurations that neither uses judge the result.
 
 References
 ----------
-[1] Stone, M., Cross-validatory choice and assessment of statistical predictions, Journal
-of the Royal Statistical Society B 36, 1974.
-[2] Hastie, T., Tibshirani, R. and Friedman, J., The Elements of Statistical Learning,
-2nd edition, sections 3.3 and 7.10, Springer, 2009.
+.. [1] Stone, M., Cross-validatory choice and assessment of statistical predictions, Journal
+   of the Royal Statistical Society B 36, 1974.
+.. [2] Hastie, T., Tibshirani, R. and Friedman, J., The Elements of Statistical Learning,
+   2nd edition, sections 3.3 and 7.10, Springer, 2009.
 """
 
 from __future__ import annotations

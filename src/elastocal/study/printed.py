@@ -15,12 +15,12 @@ is at least 1/(k + 1).
 
 References
 ----------
-[1] Geisser, S., Predictive Inference: An Introduction, Chapman and Hall, 1993.
-[2] Holm, S., A simple sequentially rejective multiple test procedure, Scandinavian
-Journal of Statistics 6, 1979.
-[3] Fisher, R. A., Statistical Methods for Research Workers, Oliver and Boyd, 1932.
-[4] Barnard, G. A., discussion of The spectral analysis of point processes, Journal of
-the Royal Statistical Society B 25, 1963.
+.. [1] Geisser, S., Predictive Inference: An Introduction, Chapman and Hall, 1993.
+.. [2] Holm, S., A simple sequentially rejective multiple test procedure, Scandinavian
+   Journal of Statistics 6, 1979.
+.. [3] Fisher, R. A., Statistical Methods for Research Workers, Oliver and Boyd, 1932.
+.. [4] Barnard, G. A., discussion of The spectral analysis of point processes, Journal of
+   the Royal Statistical Society B 25, 1963.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import stdtr
 
-from elastocal.io.data_frames import read_long
+from elastocal.io.data_frames import read_robot_tables
 from elastocal.study.evaluation import make_repeated_schema
 from elastocal.study.jobs import (
     MICRO,
@@ -439,7 +439,7 @@ def compare_with_studies(job: Job) -> None:
     """Write every printed figure among further studies, and the joint test."""
     compared = pd.read_csv(job.input.beside, dtype={"table": str})
     initial = read_frames(job, job.input.initial, INITIAL)
-    studies = read_long(job.input.studies, make_repeated_schema)
+    studies = read_robot_tables(job.input.studies, make_repeated_schema)
     printed = read_printed_figures(job.input.reference)
     length = job.params.length
     write_csvs(

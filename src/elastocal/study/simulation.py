@@ -209,8 +209,8 @@ def draw_random_experiments(
 
     References
     ----------
-    [1] Muller, M. E., A note on a method for generating points uniformly on
-    n-dimensional spheres, Communications of the ACM 2, 1959.
+    .. [1] Muller, M. E., A note on a method for generating points uniformly on
+       n-dimensional spheres, Communications of the ACM 2, 1959.
     """
     chain = design.chain
     loading = design.loading
@@ -289,8 +289,8 @@ def draw_measurement_noise(
 
     References
     ----------
-    [1] Glasserman, P. and Yao, D. D., Some guidelines and guarantees for common random
-    numbers, Management Science 38, 1992.
+    .. [1] Glasserman, P. and Yao, D. D., Some guidelines and guarantees for common random
+       numbers, Management Science 38, 1992.
     """
     return draw_data_sets(
         seed,
@@ -473,8 +473,8 @@ def draw_bootstrap_weights(
 
     References
     ----------
-    [1] Hanley, J. A. and MacGibbon, B., Creating non-parametric bootstrap samples using
-    Poisson frequencies, Computer Methods and Programs in Biomedicine 83, 2006.
+    .. [1] Hanley, J. A. and MacGibbon, B., Creating non-parametric bootstrap samples using
+       Poisson frequencies, Computer Methods and Programs in Biomedicine 83, 2006.
     """
     counts = draw_data_sets(
         seed,

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from elastocal.io.data_frames import read_long
+from elastocal.io.data_frames import read_robot_tables
 from elastocal.mechanics.robot_file import parse_robot
 from elastocal.study.evaluation import (
     REPLICATES,
@@ -394,8 +394,8 @@ def format_value(value: float | str, error: float, digits: int = 3) -> str:
 def read_results(job: Job, noise_um: float, length: int) -> Results:
     """Read the metrics and bootstrap replicates of all strategies for tables of a noise
     level and a length."""
-    metrics = read_long(job.input.metrics, make_metrics_schema)
-    replicates = read_long(job.input.replicates, lambda joints: REPLICATES)
+    metrics = read_robot_tables(job.input.metrics, make_metrics_schema)
+    replicates = read_robot_tables(job.input.replicates, lambda joints: REPLICATES)
     return Results(metrics, replicates, noise_um, length)
 
 
@@ -424,7 +424,7 @@ def tabulate_initial(job: Job) -> None:
 def tabulate_identified(job: Job) -> None:
     """Write Table 3, which needs no replicates."""
     params = job.params
-    metrics = read_long(job.input.metrics, make_metrics_schema)
+    metrics = read_robot_tables(job.input.metrics, make_metrics_schema)
     results = Results(metrics, pd.DataFrame(), params.noise_um, params.length)
     write_csvs(job, table=build_table3(results, params.robots, params.strategy))
 

@@ -16,10 +16,10 @@ share.
 
 References
 ----------
-[1] ISO 9283:1998, Manipulating industrial robots: Performance criteria and related test
-methods.
-[2] van der Vaart, A. W., Asymptotic Statistics, chapters 3 and 21, Cambridge University
-Press, 1998.
+.. [1] ISO 9283:1998, Manipulating industrial robots: Performance criteria and related test
+   methods.
+.. [2] van der Vaart, A. W., Asymptotic Statistics, chapters 3 and 21, Cambridge University
+   Press, 1998.
 """
 
 from __future__ import annotations
@@ -387,10 +387,10 @@ def _round(values: np.ndarray) -> np.ndarray:
 
 def tabulate_uses(job: Job) -> None:
     """Write scores and pairs of the strategies on all robots."""
-    from elastocal.io.data_frames import read_long
+    from elastocal.io.data_frames import read_robot_tables
 
-    metrics = read_long(job.input.metrics, make_metrics_schema)
-    replicates = read_long(job.input.replicates, lambda joints: REPLICATES)
+    metrics = read_robot_tables(job.input.metrics, make_metrics_schema)
+    replicates = read_robot_tables(job.input.replicates, lambda joints: REPLICATES)
     scores = {
         robot: score_strategies(
             uses,

@@ -20,31 +20,31 @@ from typing import Any
 import numpy as np
 
 from elastocal_proof.blind.folders import write_blind_campaign, write_truth
-from elastocal_proof.plant.arm import Arm, LinkMass, arm_from_file
+from elastocal_proof.plant.arm import Arm, LinkMass, read_arm
 from elastocal_proof.plant.campaigns import (
-    SLIPS,
+    BLUNDER_KINDS,
+    Blunder,
     Design,
-    Slip,
     Table,
-    schedule_of,
-    with_bad_rows,
+    add_blunders,
+    draw_schedule,
 )
 from elastocal_proof.plant.kinds import (
     KINDS,
     OUTSIDE,
     Defect,
-    drawn_defect,
-    with_defects,
+    apply_defects,
+    draw_defect,
 )
-from elastocal_proof.plant.machine import usual_gravity_torque
-from elastocal_proof.plant.physical_robot import (
+from elastocal_proof.plant.multibody import compute_typical_gravity_torque
+from elastocal_proof.plant.simulated_robot import (
     Motion,
-    PhysicalRobot,
+    SimulatedRobot,
     Tracker,
-    specimen,
-    stream,
+    draw_specimen,
+    open_simulation_stream,
 )
-from elastocal_proof.plant.sizing import Yardstick
+from elastocal_proof.plant.sizing import NoncentralityModel
 
 Plan = Mapping[str, Any]
 Sized = tuple[Defect, dict[str, Any]]
@@ -169,21 +169,21 @@ class BlindCase:
         compensated."""
         return arm.masses if self.weighs else ()
 
-    def specimen(self, robots_folder: str | Path) -> PhysicalRobot:
+    def specimen(self, robots_folder: str | Path) -> SimulatedRobot:
         """Its robot before anything is wrong with it; its weights, its tracker and its
         drives are the setting's."""
-        arm = arm_from_file(self.robot_file(robots_folder))
+        arm = read_arm(self.robot_file(robots_folder))
         arm = replace(
             arm, gravity_m_s2=tuple(self.changes.get("gravity_m_s2", arm.gravity_m_s2))
         )
-        robot = specimen(
+        robot = draw_specimen(
             arm,
             self.seed,
             weighs=self.weighs,
             off_line_m=self.changes.get("off_line_m", 0.0),
         )
         # Repeatabilities differ from joint to joint, errors of a pose do not.
-        spread = self.changes.get("joint_rad", 0.0) * stream(
+        spread = self.changes.get("joint_rad", 0.0) * open_simulation_stream(
             self.seed, "repeatability"
         ).uniform(0.5, 1.5, arm.joints)
         alike = (self.changes.get("pose_rad", 0.0),) * arm.joints
@@ -242,7 +242,7 @@ def list_cases(plan: Plan, size: str, seed: int) -> list[BlindCase]:
 def draw_misplaced_base(seed: int) -> Motion:
     """A base frame that was found badly: tilted by about 0.3 mrad and shifted by about
     0.2 mm, all measurements alike."""
-    draws = stream(seed, "tilted base")
+    draws = open_simulation_stream(seed, "tilted base")
     return Motion(
         tuple(_SHIFT_M * draws.standard_normal(3)),
         tuple(_TILT_RAD * draws.standard_normal(3)),
@@ -320,11 +320,15 @@ def _drawn_pair(
     pairs = list(
         combinations([name for name in CATALOGUE_EFFECTS if name not in absent], 2)
     )
-    return pairs[stream(seed, f"pair {robot} {level} {number}").integers(len(pairs))]
+    return pairs[
+        open_simulation_stream(seed, f"pair {robot} {level} {number}").integers(
+            len(pairs)
+        )
+    ]
 
 
 def size_defects(
-    case: BlindCase, robot: PhysicalRobot, yardstick: Yardstick
+    case: BlindCase, robot: SimulatedRobot, yardstick: NoncentralityModel
 ) -> list[Sized]:
     """The defects of a case at the sizes that give their non-centralities, each with
     its size as in the ground truth.
@@ -363,18 +367,18 @@ def size_defects(
 
 
 def _drawn(
-    case: BlindCase, robot: PhysicalRobot, effect: str, seed: int
+    case: BlindCase, robot: SimulatedRobot, effect: str, seed: int
 ) -> list[Defect]:
     """Defects of plausible size that belong together: one, or one mechanism at several
     joints."""
     arm = robot.arm
-    draws = stream(seed, f"joints of {effect}")
+    draws = open_simulation_stream(seed, f"joints of {effect}")
     kind = KINDS[effect]
     locations = kind.locations(arm)
     if case.group == SEVERAL_JOINTS:
         count = draws.integers(min(_FEWEST_JOINTS, len(locations)), len(locations) + 1)
         chosen = sorted(draws.choice(len(locations), count, replace=False).tolist())
-        plausible = kind.plausible_on(arm)
+        plausible = kind.scale_plausible_size(arm)
         return [
             Defect(
                 effect,
@@ -384,12 +388,12 @@ def _drawn(
             )
             for place in chosen
         ]
-    defect = drawn_defect(effect, arm, seed)
+    defect = draw_defect(effect, arm, seed)
     if case.group == UNDECLARED:
         # The last of its locations: of all links.
         return [replace(defect, joints=locations[-1])]
     if case.group == GEAR_GRAVITY:
-        torque = usual_gravity_torque(arm, arm.masses, arm.gravity_m_s2)
+        torque = compute_typical_gravity_torque(arm, arm.masses, arm.gravity_m_s2)
         defect = replace(
             defect,
             joints=(
@@ -399,16 +403,18 @@ def _drawn(
     return [defect]
 
 
-def build_yardstick(case: BlindCase, robot: PhysicalRobot) -> Yardstick:
+def build_yardstick(case: BlindCase, robot: SimulatedRobot) -> NoncentralityModel:
     """To which the defective robots of a case are compared; `robot`: faultless."""
     free = case.design.frame == "tracker"
-    done = schedule_of(robot.arm, case.design, case.seed)
-    return Yardstick(robot, done, free_frame=free, declared=case.declared(robot.arm))
+    done = draw_schedule(robot.arm, case.design, case.seed)
+    return NoncentralityModel(
+        robot, done, free_frame=free, declared=case.declared(robot.arm)
+    )
 
 
 def _first_plausible(
-    yardstick: Yardstick,
-    robot: PhysicalRobot,
+    yardstick: NoncentralityModel,
+    robot: SimulatedRobot,
     drawn: list[list[Defect]],
     level: float,
     quantity: str,
@@ -421,7 +427,7 @@ def _first_plausible(
         try:
             factor = find_size(
                 yardstick,
-                partial(with_defects, robot, defects),
+                partial(apply_defects, robot, defects),
                 1.0,
                 level,
                 quantity,
@@ -444,8 +450,8 @@ def _first_plausible(
 
 
 def find_size(
-    yardstick: Yardstick,
-    robot_of_size: Callable[[float], PhysicalRobot],
+    yardstick: NoncentralityModel,
+    robot_of_size: Callable[[float], SimulatedRobot],
     start: float,
     target: float,
     quantity: str = "retained",
@@ -465,7 +471,7 @@ def find_size(
     exponent = 2.0
     last: tuple[float, float] | None = None
     for _ in range(_ROUNDS):
-        signal = yardstick.signal(robot_of_size(size))
+        signal = yardstick.compute_noncentralities(robot_of_size(size))
         value = signal[quantity]
         # What is absorbed leaves rounding and second order, a millionth of the raw
         # signal.
@@ -490,8 +496,8 @@ def find_size(
 
 
 def _stated(
-    yardstick: Yardstick,
-    robot: PhysicalRobot,
+    yardstick: NoncentralityModel,
+    robot: SimulatedRobot,
     defects: list[Defect],
     level: float,
     quantity: str,
@@ -500,7 +506,7 @@ def _stated(
     """Defects with their sizes as in the ground truth, each with its own signal."""
     found: list[Sized] = []
     for defect in defects:
-        signal = yardstick.signal(with_defects(robot, [defect]))
+        signal = yardstick.compute_noncentralities(apply_defects(robot, [defect]))
         share = _share_of_plausible(robot, defect)
         sizing = {
             "non_centrality": level,
@@ -513,8 +519,8 @@ def _stated(
     return found
 
 
-def _share_of_plausible(robot: PhysicalRobot, defect: Defect) -> float:
-    return defect.size / KINDS[defect.effect].plausible_on(robot.arm)
+def _share_of_plausible(robot: SimulatedRobot, defect: Defect) -> float:
+    return defect.size / KINDS[defect.effect].scale_plausible_size(robot.arm)
 
 
 def write_sealed_case(
@@ -529,17 +535,19 @@ def write_sealed_case(
     design = case.design
     yardstick = build_yardstick(case, robot) if case.effects else None
     sized = size_defects(case, robot, yardstick) if yardstick else []
-    bad = with_defects(robot, [defect for defect, _ in sized])
+    bad = apply_defects(robot, [defect for defect, _ in sized])
     folder = Path(blind_folder) / case.name
-    schedule = schedule_of(robot.arm, design, case.seed)
+    schedule = draw_schedule(robot.arm, design, case.seed)
 
-    def slipped(table: Table) -> tuple[Table, list[Slip]]:
+    def slipped(table: Table) -> tuple[Table, list[Blunder]]:
         """One to so many bad rows, of one kind."""
-        draws = stream(case.seed, "bad rows")
-        possible = [kind for kind in SLIPS if kind != "load" or table["load"].any()]
+        draws = open_simulation_stream(case.seed, "bad rows")
+        possible = [
+            kind for kind in BLUNDER_KINDS if kind != "load" or table["load"].any()
+        ]
         kind = str(draws.choice(possible))
         count = int(draws.integers(1, case.changes["bad_rows"] + 1))
-        return with_bad_rows(table, bad, schedule, kind, count, draws)
+        return add_blunders(table, bad, schedule, kind, count, draws)
 
     file = case.robot_file(robots_folder)
     slips = slipped if "bad_rows" in case.changes else None

@@ -41,7 +41,7 @@ from elastocal.fitting.observations import select_states
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import write_table
-from elastocal.loop.whole import calibrated_by, cases_in
+from elastocal.loop.whole import build_calibrated_robot, read_cases
 from elastocal.mechanics.kinematics import compute_jacobians, compute_pose_differences
 from elastocal.random_streams import open_stream as analysis_stream
 from elastocal.validation.conformity import decide_conformity
@@ -55,15 +55,15 @@ from elastocal_proof.blind.rehearsal import (
     move_robot,
 )
 from elastocal_proof.plant.campaigns import (
+    Blunder,
     Design,
-    Slip,
     Table,
-    schedule_of,
-    usual_force_N,
-    with_bad_rows,
+    add_blunders,
+    draw_schedule,
+    get_typical_force_N,
 )
 from elastocal_proof.plant.kinds import KINDS
-from elastocal_proof.plant.physical_robot import stream
+from elastocal_proof.plant.simulated_robot import open_simulation_stream
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -74,7 +74,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case
     from elastocal.mechanics.robot import Robot
-    from elastocal_proof.plant.physical_robot import PhysicalRobot
+    from elastocal_proof.plant.simulated_robot import SimulatedRobot
 
 UNCORRECTED = "uncorrected"
 GEOMETRY = "geometry"
@@ -135,7 +135,7 @@ class DiagnosedRobot:
     """A robot with one hidden defect, as its analyst knows it, what was fitted and what
     was not, and what it shall reach."""
 
-    plant: PhysicalRobot
+    plant: SimulatedRobot
     declared: Robot
     training: Case
     held_out: Case
@@ -165,7 +165,7 @@ def list_hidden_effects(
             yield (
                 effect,
                 int(
-                    stream(
+                    open_simulation_stream(
                         seed, f"closed loop {Path(robot_file).stem} {effect} {number}"
                     ).integers(2**31)
                 ),
@@ -183,17 +183,15 @@ def measure_robot(
     """
     plant = build_hidden_robot(robot_file, seed, [effect])[0]
     design = replace(CAMPAIGN, frame=frame)
-    draws = stream(seed, "lost beam")
+    draws = open_simulation_stream(seed, "lost beam")
     if slips:
         plant = misplace_base(plant, seed)
-    schedule = schedule_of(plant.arm, design, seed)
+    schedule = draw_schedule(plant.arm, design, seed)
 
-    def lost(table: Table) -> tuple[Table, list[Slip]]:
+    def lost(table: Table) -> tuple[Table, list[Blunder]]:
         kind = str(draws.choice(["zeros", "held_point"]))
         fitted = design.poses - design.held_out
-        tries = iter(
-            lambda: with_bad_rows(table, plant, schedule, kind, 1, draws), None
-        )
+        tries = iter(lambda: add_blunders(table, plant, schedule, kind, 1, draws), None)
         return next(
             (bad, slip)
             for bad, slip in tries
@@ -212,7 +210,7 @@ def measure_robot(
             plant.arm.masses,
             slipped,
         )
-        training, held_out = cases_in(folder, robot_file.parent)
+        training, held_out = read_cases(folder, robot_file.parent)
     robot = training.campaign.robot
     return DiagnosedRobot(
         plant,
@@ -224,12 +222,12 @@ def measure_robot(
     )
 
 
-def draw_wanted_poses(robot: Robot, plant: PhysicalRobot, seed: int) -> WantedPoses:
+def draw_wanted_poses(robot: Robot, plant: SimulatedRobot, seed: int) -> WantedPoses:
     """Poses of all parts that a robot shall reach: random ones without and under load,
     and a path of milling."""
-    draws = stream(seed, "wanted poses")
+    draws = open_simulation_stream(seed, "wanted poses")
     low, high = robot.joint_limits.T
-    force = usual_force_N(plant.arm)
+    force = get_typical_force_N(plant.arm)
     angles = low + (high - low) * (
         0.5 + _REACH * (draws.random((2 * _POSES, robot.joints)) - 0.5)
     )
@@ -310,7 +308,9 @@ def run_closed_loop(
 def _corrected(made: DiagnosedRobot, seed: int) -> CalibratedRobot:
     """The robot as the diagnosis corrects it."""
     part = remove_gross_errors(made.found, made.held_out)[1]
-    return calibrated_by(made.found, part, apply_regression(made.found, part, seed))
+    return build_calibrated_robot(
+        made.found, part, apply_regression(made.found, part, seed)
+    )
 
 
 def _geometry(case: Case, found: Diagnosis) -> Fit:
@@ -368,7 +368,9 @@ def _moved(made: DiagnosedRobot, commands: np.ndarray, seed: int) -> dict[str, A
     wanted = made.wanted
     position, rotation = move_robot(made.plant, commands, wanted.wrench, seed + 1)
     read, _ = made.plant.tracker.read(
-        position[:, None], rotation[:, None], stream(seed, "measured again")
+        position[:, None],
+        rotation[:, None],
+        open_simulation_stream(seed, "measured again"),
     )
     return {
         "part": wanted.part,
@@ -415,7 +417,11 @@ def compare_stated_accuracy(
                 columns[over], field[over], np.repeat([True, True, False, False], 3)
             )
         )[:, :3, 0]
-    tolerance = float(np.exp(stream(seed, "tolerance").uniform(*np.log(_TOLERANCES_M))))
+    tolerance = float(
+        np.exp(
+            open_simulation_stream(seed, "tolerance").uniform(*np.log(_TOLERANCES_M))
+        )
+    )
     rows = []
     for part, members in STATED_PARTS.items():
         mine = good & np.isin(wanted.part, members)

@@ -20,10 +20,15 @@ from elastocal.errors import InputError
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.json_files import read_json
 from elastocal_proof.plant.arm import Arm, LinkMass
-from elastocal_proof.plant.campaigns import Design, Slip, Table, measured_table
-from elastocal_proof.plant.physical_robot import PhysicalRobot, Schedule
+from elastocal_proof.plant.campaigns import (
+    Blunder,
+    Design,
+    Table,
+    simulate_measurements,
+)
+from elastocal_proof.plant.simulated_robot import Schedule, SimulatedRobot
 
-DamageRows = Callable[[Table], tuple[Table, list[Slip]]]
+DamageRows = Callable[[Table], tuple[Table, list[Blunder]]]
 
 ROBOT_FILE = "robot.yaml"
 
@@ -55,7 +60,7 @@ def write_blind_campaign(
     folder: str | Path,
     name: str,
     robot_file: str | Path,
-    robot: PhysicalRobot,
+    robot: SimulatedRobot,
     design: Design,
     schedule: Schedule,
     declared: Sequence[LinkMass] = (),
@@ -68,7 +73,7 @@ def write_blind_campaign(
     truth away. `robot_file`: of which the robot is a specimen. `declared`: weights as
     they are declared to the analyst. `slipped`: what goes wrong in the file.
     """
-    table = measured_table(robot, design, schedule)
+    table = simulate_measurements(robot, design, schedule)
     table, slips = slipped(table) if slipped else (table, [])
     write_campaign(
         folder,
@@ -102,7 +107,7 @@ def write_blind_campaign(
 def write_robot_file(
     folder: str | Path,
     robot_file: str | Path,
-    robot: PhysicalRobot,
+    robot: SimulatedRobot,
     declared: Sequence[LinkMass],
     undeclared: Sequence[str] = (),
 ) -> None:

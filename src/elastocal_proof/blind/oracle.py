@@ -37,7 +37,7 @@ from elastocal.fitting.model import Case
 from elastocal.fitting.noise import fit_declared_model, parse_noise
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.typed_json import to_document
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import read_cases
 from elastocal.validation.transfer import find_extrapolated_poses
 from elastocal_proof.blind.cases import (
     CATALOGUE_EFFECTS,
@@ -47,8 +47,8 @@ from elastocal_proof.blind.cases import (
 )
 from elastocal_proof.blind.cases import BlindCase as BlindCase
 from elastocal_proof.blind.folders import load_ground_truth
-from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, with_defects
-from elastocal_proof.plant.physical_robot import stream
+from elastocal_proof.plant.kinds import KINDS, OUTSIDE, Defect, apply_defects
+from elastocal_proof.plant.simulated_robot import open_simulation_stream
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -57,8 +57,8 @@ if TYPE_CHECKING:
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.least_squares import Fit
     from elastocal_proof.blind.cases import Plan
-    from elastocal_proof.plant.physical_robot import PhysicalRobot
-    from elastocal_proof.plant.sizing import Yardstick
+    from elastocal_proof.plant.simulated_robot import SimulatedRobot
+    from elastocal_proof.plant.sizing import NoncentralityModel
 
     _Chosen = tuple[float, Candidate, tuple[float, ...]]
 
@@ -104,7 +104,7 @@ def fit_oracle(
         # Without an effect the declared model is the right one, and has been judged
         # already.
         return _outcome((), 1.0, verdict["heldout"]["before"])
-    case, unseen = cases_in(folder, robots_folder)
+    case, unseen = read_cases(folder, robots_folder)
     declared = fit_declared_model(
         case.model, case.observations, parse_noise(verdict).without_pose_error
     )
@@ -230,7 +230,10 @@ def assess_sampled_case(
     case = BlindCase(
         **stated | {name: tuple(stated[name]) for name in ("effects", "levels")}
     )
-    drawn = stream(case.seed, "sample of the limit").random() < 1 / asked["one_in"]
+    drawn = (
+        open_simulation_stream(case.seed, "sample of the limit").random()
+        < 1 / asked["one_in"]
+    )
     absorbed = any(defect["of"] == "raw" for defect in truth["defects"])
     compared = [case.group, *case.levels[:1]] in asked["of"]
     return (
@@ -252,7 +255,7 @@ def assess_best_analyst(
     """
     robot = case.specimen(robots_folder)
     yardstick = build_yardstick(case, robot)
-    bad = with_defects(
+    bad = apply_defects(
         robot, [defect for defect, _ in size_defects(case, robot, yardstick)]
     )
     kinds = [
@@ -262,11 +265,11 @@ def assess_best_analyst(
     ]
     located, units = draw_unit_signals(yardstick, robot, kinds, case.seed)
     sets, columns = _hypotheses(located, len(case.effects))
-    residual = yardstick.residual(bad)
+    residual = yardstick.compute_measured_residual(bad)
     flat = units.reshape(len(residual), -1)
     gram = flat.T @ flat
     along = flat.T @ residual
-    draws = stream(case.seed, "null distribution of the limit")
+    draws = open_simulation_stream(case.seed, "null distribution of the limit")
     # Of noise alone, the products with all signals.
     values, vectors = np.linalg.eigh(gram)
     noise = (vectors * np.sqrt(np.clip(values, 0.0, None))) @ draws.standard_normal(
@@ -295,7 +298,10 @@ def assess_best_analyst(
 
 
 def draw_unit_signals(
-    yardstick: Yardstick, robot: PhysicalRobot, kinds: Iterable[str], seed: int
+    yardstick: NoncentralityModel,
+    robot: SimulatedRobot,
+    kinds: Iterable[str],
+    seed: int,
 ) -> tuple[tuple[str, ...], np.ndarray]:
     """What drawn defects of each kind show at each of its locations.
 
@@ -305,17 +311,17 @@ def draw_unit_signals(
     named = []
     units = []
     for kind in kinds:
-        size = KINDS[kind].plausible_on(robot.arm)
+        size = KINDS[kind].scale_plausible_size(robot.arm)
         for location in KINDS[kind].locations(robot.arm):
-            drawn = stream(seed, f"limit {kind} {location}").integers(
+            drawn = open_simulation_stream(seed, f"limit {kind} {location}").integers(
                 2**31, size=_DRAWS
             )
             shown = [
-                with_defects(robot, [Defect(kind, location, size, int(number))])
+                apply_defects(robot, [Defect(kind, location, size, int(number))])
                 for number in drawn
             ]
             seen, left = zip(
-                *(yardstick.seen_and_left(one) for one in shown), strict=True
+                *(yardstick.project_change(one) for one in shown), strict=True
             )
             remaining = np.linalg.norm(left, axis=1)
             visible = remaining**2 > _ABSORBED * np.linalg.norm(seen, axis=1) ** 2

@@ -29,23 +29,23 @@ from elastocal.exchange.target_path import read_target_path
 from elastocal.io.atomic_writes import atomic_write, check_places
 from elastocal.io.texts import read_text
 from elastocal.mechanics.components import WRENCH_NAMES
-from elastocal.report.words import at_joints, listed, physical_name
+from elastocal.report.words import format_joints, join_items, name_effect
 from elastocal_proof.blind.cases import draw_misplaced_base
-from elastocal_proof.plant.arm import arm_from_file, rotation_vector
-from elastocal_proof.plant.campaigns import SECONDS_PER_STATE, usual_force_N
+from elastocal_proof.plant.arm import read_arm, to_rotation_vector
+from elastocal_proof.plant.campaigns import SECONDS_PER_STATE, get_typical_force_N
 from elastocal_proof.plant.kinds import (
     KINDS,
     OUTSIDE,
     Defect,
-    drawn_defect,
-    with_defects,
+    apply_defects,
+    draw_defect,
 )
-from elastocal_proof.plant.physical_robot import (
-    PhysicalRobot,
+from elastocal_proof.plant.simulated_robot import (
     Schedule,
-    seen_poses,
-    specimen,
-    stream,
+    SimulatedRobot,
+    draw_specimen,
+    open_simulation_stream,
+    simulate_poses,
 )
 
 if TYPE_CHECKING:
@@ -71,14 +71,14 @@ _TRIES = 200
 
 def build_hidden_robot(
     robot_file: str | Path, seed: int, effects: Sequence[str] = ()
-) -> tuple[PhysicalRobot, list[Defect]]:
+) -> tuple[SimulatedRobot, list[Defect]]:
     """The robot that stands in, and its defects.
 
     `effects`: keys of `KINDS`, each at a joint that is drawn; one that is drawn by
     default. Raises `InputError`: an effect that this arm cannot have.
     """
     declared = read_robot(robot_file)
-    arm = arm_from_file(robot_file)
+    arm = read_arm(robot_file)
     possible = sorted(
         name
         for name, kind in KINDS.items()
@@ -94,37 +94,42 @@ def build_hidden_robot(
     if declared.compensator is None:
         possible = [name for name in possible if name not in _COMPENSATORS]
     chosen = tuple(effects)
-    draws = stream(seed, "errors of geometry")
+    draws = open_simulation_stream(seed, "errors of geometry")
     if not chosen:
-        chosen = (possible[stream(seed, "hidden effect").integers(len(possible))],)
+        chosen = (
+            possible[
+                open_simulation_stream(seed, "hidden effect").integers(len(possible))
+            ],
+        )
     of_geometry = [
         Defect(
             name,
             joints,
-            KINDS[name].plausible_on(arm) * draws.uniform(),
+            KINDS[name].scale_plausible_size(arm) * draws.uniform(),
             seed + 1 + place,
         )
         for name in ERRORS_OF_GEOMETRY
         for place, joints in enumerate(KINDS[name].locations(arm))
     ]
-    defects = [*of_geometry, *(drawn_defect(name, arm, seed) for name in chosen)]
+    defects = [*of_geometry, *(draw_defect(name, arm, seed) for name in chosen)]
     robot = replace(
-        specimen(arm, seed), repeatability_rad=(_JOINT_REPEATABILITY_RAD,) * arm.joints
+        draw_specimen(arm, seed),
+        repeatability_rad=(_JOINT_REPEATABILITY_RAD,) * arm.joints,
     )
-    return with_defects(robot, defects), defects
+    return apply_defects(robot, defects), defects
 
 
 def describe_hidden_effects(defects: Sequence[Defect], effects: Sequence[str]) -> str:
     """What `build_hidden_robot` hid of effects that were asked for, or drew; the small errors
     that every robot has stand before."""
     hidden = defects[-max(len(effects), 1) :]
-    return listed(
-        f"{physical_name(defect.effect)}{at_joints(defect.effect, defect.joints)}"
+    return join_items(
+        f"{name_effect(defect.effect)}{format_joints(defect.effect, defect.joints)}"
         for defect in hidden
     )
 
 
-def misplace_base(robot: PhysicalRobot, seed: int) -> PhysicalRobot:
+def misplace_base(robot: SimulatedRobot, seed: int) -> SimulatedRobot:
     """The robot beside a tracker whose frame of the base is off by some 0.3 mrad and
     0.2 mm."""
     return replace(
@@ -133,7 +138,7 @@ def misplace_base(robot: PhysicalRobot, seed: int) -> PhysicalRobot:
 
 
 def fill_sheet(
-    path: Path, document: Mapping[str, Any], robot: PhysicalRobot, seed: int
+    path: Path, document: Mapping[str, Any], robot: SimulatedRobot, seed: int
 ) -> int:
     """Fill the measurement sheet at `path` with what a tracker reads; returns how many
     measurements it has now.
@@ -167,13 +172,15 @@ def fill_sheet(
     number = pd.MultiIndex.from_frame(states[_STATE]).get_indexer(
         pd.MultiIndex.from_frame(sheet[_STATE])
     )
-    position, rotation = seen_poses(robot, _schedule(robot.arm, states, seed, source))
+    position, rotation = simulate_poses(
+        robot, _schedule(robot.arm, states, seed, source)
+    )
     at = [robot.arm.points.index(target["point"]) for target in targets.values()]
 
     def where(value: str | Sequence[float], name: str, within: float) -> np.ndarray:
         # A draw within bounds where the campaign does not know.
         return (
-            stream(seed, name).uniform(-within, within, 3)
+            open_simulation_stream(seed, name).uniform(-within, within, 3)
             if isinstance(value, str)
             else np.array(value, float)
         )
@@ -191,22 +198,22 @@ def fill_sheet(
     position = position[:, at] + (rotation[:, at] @ offsets[..., None])[..., 0]
     rotation = rotation[:, at] @ Rotation.from_rotvec(mounts).as_matrix()
     position, rotation = robot.tracker.read(
-        position, rotation, stream(seed, "readings")
+        position, rotation, open_simulation_stream(seed, "readings")
     )
     if document["frame"] == "tracker":
-        position, rotation = robot.tracker.in_own_frame(position, rotation)
+        position, rotation = robot.tracker.to_tracker_frame(position, rotation)
     seen = number, pd.Index(list(targets)).get_indexer(sheet["target"])
     measured = dict(zip("xyz", position[seen].T, strict=True))
     if document["measured"] == "pose":
         measured |= dict(
-            zip(("rx", "ry", "rz"), rotation_vector(rotation[seen]).T, strict=True)
+            zip(("rx", "ry", "rz"), to_rotation_vector(rotation[seen]).T, strict=True)
         )
     _write_table(path, sheet.assign(**measured))
     return len(sheet)
 
 
 def write_milling_path(
-    path: Path, declared: Robot, robot: PhysicalRobot, seed: int
+    path: Path, declared: Robot, robot: SimulatedRobot, seed: int
 ) -> int:
     """Write wanted poses along a bow as for milling, under half the usual force of such
     a robot; returns how many."""
@@ -215,7 +222,7 @@ def write_milling_path(
         declared, _BOW * robot.arm.reach_m, _BOW_POSES, np.random.default_rng(seed)
     )
     force = np.tile(
-        [0.0, 0.0, usual_force_N(robot.arm) / 2, 0.0, 0.0, 0.0], (len(at), 1)
+        [0.0, 0.0, get_typical_force_N(robot.arm) / 2, 0.0, 0.0, 0.0], (len(at), 1)
     )
     names = [
         "x",
@@ -235,7 +242,7 @@ def write_milling_path(
 
 
 def measure_errors(
-    path: Path, targets: Path, robot: PhysicalRobot, seed: int
+    path: Path, targets: Path, robot: SimulatedRobot, seed: int
 ) -> dict[str, np.ndarray]:
     """Distances (N,), m, of where the tracker sees the robot from the wanted poses, in
     the campaign's frame of the base.
@@ -262,9 +269,9 @@ def measure_errors(
         ]
         position, rotation = (part[:, None] for part in visits[0])
         noise = (
-            robot.tracker.read(position, rotation, stream(seed, "noise along a path"))[
-                0
-            ][:, 0]
+            robot.tracker.read(
+                position, rotation, open_simulation_stream(seed, "noise along a path")
+            )[0][:, 0]
             - visits[0][0]
         )
         off[name] = np.linalg.norm(visits[0][0] + noise - wanted.position, axis=1)
@@ -276,7 +283,7 @@ def measure_errors(
 
 
 def move_robot(
-    robot: PhysicalRobot,
+    robot: SimulatedRobot,
     shown: np.ndarray,
     wrench: np.ndarray,
     seed: int,
@@ -299,7 +306,7 @@ def move_robot(
     rows = pd.DataFrame(
         columns | {"pose": np.arange(len(shown)), "load": 0, "repeat": 0}
     )
-    position, rotation = seen_poses(robot, _schedule(robot.arm, rows, seed, source))
+    position, rotation = simulate_poses(robot, _schedule(robot.arm, rows, seed, source))
     return position[:, -1], rotation[:, -1]
 
 
@@ -377,7 +384,9 @@ def _schedule(arm: Arm, states: pd.DataFrame, seed: int, source: str) -> Schedul
             "the moment of the force at a lever",
         )
     approach = [f"approach{j}" for j in range(1, arm.joints + 1)]
-    drawn = stream(seed, "approaches").choice([-1, 1], (count, arm.joints))
+    drawn = open_simulation_stream(seed, "approaches").choice(
+        [-1, 1], (count, arm.joints)
+    )
     sense = (
         states[approach].fillna(0).to_numpy(int)
         if set(approach) <= set(states)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from elastocal.io.json_files import write_json
-from elastocal.loop.whole import diagnosed
+from elastocal.loop.whole import diagnose_folder
 
 
 def diagnose_cases(job: Any) -> None:
@@ -19,7 +19,7 @@ def diagnose_cases(job: Any) -> None:
     verdicts = []
     for number, folder in enumerate(folders, 1):
         verdicts.append(
-            diagnosed(folder.as_posix(), job.params.robots, job.params.seed)
+            diagnose_folder(folder.as_posix(), job.params.robots, job.params.seed)
         )
         print(
             f"{job.wildcards.block}: {number} of {len(folders)} cases",

@@ -63,7 +63,7 @@ _PARTS = {"unloaded": "unloaded", "loaded": "under loads", "milling": "milling p
 
 
 @styled
-def rates_and_targets(summary: pd.DataFrame) -> Figure:
+def draw_targets(summary: pd.DataFrame) -> Figure:
     """Every figure of summary.csv that has a target, with its interval and the range
     that the target leaves."""
     aimed = select_targets(summary)
@@ -154,7 +154,7 @@ def _dots(
 
 
 @styled
-def reliability_diagram(reliability: pd.DataFrame) -> Figure:
+def draw_reliability(reliability: pd.DataFrame) -> Figure:
     """Shares of cases whose most probable set of mechanisms is true, against what was
     stated, and numbers of cases."""
     rows = reliability[reliability.group == _ALL]
@@ -188,7 +188,7 @@ def reliability_diagram(reliability: pd.DataFrame) -> Figure:
 
 
 @styled
-def power_map(rates: pd.DataFrame) -> Figure:
+def draw_power(rates: pd.DataFrame) -> Figure:
     """Shares of rates.csv detected and named for each effect and size, beside the
     oracle that knows the effect."""
     single = rates[rates.group == "single"]
@@ -254,9 +254,9 @@ def _heat(axis: Axes, shares: np.ndarray) -> None:
 def draw_blind(job: Any) -> None:
     """All pictures of the proof, by their names."""
     for name, draw, table in (
-        ("targets", rates_and_targets, "summary"),
-        ("reliability", reliability_diagram, "reliability"),
-        ("power", power_map, "rates"),
+        ("targets", draw_targets, "summary"),
+        ("reliability", draw_reliability, "reliability"),
+        ("power", draw_power, "rates"),
     ):
         figure = draw(pd.read_csv(job.input[table]))
         save(
@@ -268,7 +268,7 @@ def draw_blind(job: Any) -> None:
 
 
 @styled
-def closed_loop(table: pd.DataFrame, names: Mapping[str, str]) -> Figure:
+def draw_correction_errors(table: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     """What a robot misses after its targets were corrected, by part and by the model
     that corrected them.
 
@@ -315,5 +315,5 @@ def closed_loop(table: pd.DataFrame, names: Mapping[str, str]) -> Figure:
 def draw_closed_loop(job: Any) -> None:
     """The picture, from reports/closed_loop/closed_loop.csv."""
     names = {Path(path).stem: read_robot(Path(path)).name for path in job.input.robots}
-    figure = closed_loop(pd.read_csv(job.input.summary), names)
+    figure = draw_correction_errors(pd.read_csv(job.input.summary), names)
     save(figure, job.output.figure, job.output.picture, Origin(**job.config["origin"]))

@@ -19,10 +19,14 @@ from elastocal.figures.style import PALETTE, create_panels, draw_note, save, sty
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.io.origin import Origin
-from elastocal.report.words import physical_name
+from elastocal.report.words import name_effect
 from elastocal_proof.league.methods import RANDOM, Method
 from elastocal_proof.league.schemas import ENTRIES, MECHANISMS
-from elastocal_proof.league.table import league_page, league_table, mechanism_table
+from elastocal_proof.league.table import (
+    compare_methods,
+    format_league_page,
+    summarize_mechanisms,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -45,7 +49,7 @@ _UNKNOWN = "not in the catalogue"
 
 
 @styled
-def league_picture(table: pd.DataFrame, methods: Mapping[str, Method]) -> Figure:
+def draw_method_errors(table: pd.DataFrame, methods: Mapping[str, Method]) -> Figure:
     """RMS of every method over that of geometry alone, a panel for each split, a row
     for each data set."""
     names = list(dict.fromkeys(table["data"]))
@@ -97,7 +101,7 @@ def league_picture(table: pd.DataFrame, methods: Mapping[str, Method]) -> Figure
 
 
 @styled
-def mechanism_picture(table: pd.DataFrame) -> Figure:
+def draw_mechanisms(table: pd.DataFrame) -> Figure:
     """Mechanisms by data set: the area of a circle is the share of the error, its
     colour the probability."""
     strongest = table.groupby("mechanism")["probability"].max()
@@ -154,7 +158,7 @@ def mechanism_picture(table: pd.DataFrame) -> Figure:
     )
     axis.set_yticks(
         range(len(order)),
-        [_UNKNOWN if name == OTHER else physical_name(name) for name in order],
+        [_UNKNOWN if name == OTHER else name_effect(name) for name in order],
     )
     axis.set_xlim(-0.5, len(names) - 0.2)
     axis.set_ylim(len(order) - 0.5, -0.5)
@@ -191,20 +195,25 @@ def tabulate_league(job: Any) -> None:
         data: read_frame(path, MECHANISMS)
         for data, path in zip(random, job.input.mechanisms, strict=True)
     }
-    table = league_table(entries, asked.robots, asked.reference, asked.seed)
-    mechanisms = mechanism_table(found, asked.robots, asked.folds)
+    table = compare_methods(entries, asked.robots, asked.reference, asked.seed)
+    mechanisms = summarize_mechanisms(found, asked.robots, asked.folds)
     for path, one in ((output.league, table), (output.mechanisms, mechanisms)):
         write_csv(path, one)
-    page = league_page(table, mechanisms, methods, asked.missing)
+    page = format_league_page(table, mechanisms, methods, asked.missing)
     write_text(output.page, page)
     for name, file in asked.missing.items():
         print(
             f"left out of the league: {name}, as {file} is missing in ELASTOCAL_DATA",
             file=sys.stderr,
         )
-    save(league_picture(table, methods), output.picture_pdf, output.picture_png, origin)
     save(
-        mechanism_picture(mechanisms),
+        draw_method_errors(table, methods),
+        output.picture_pdf,
+        output.picture_png,
+        origin,
+    )
+    save(
+        draw_mechanisms(mechanisms),
         output.mechanisms_pdf,
         output.mechanisms_png,
         origin,

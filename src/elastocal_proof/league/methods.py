@@ -31,9 +31,9 @@ from elastocal.fitting.noise import estimate_noise, fit_declared_model
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import read_table, write_table
-from elastocal.loop.diagnosis_tables import diagnosis_facts, step_fit
-from elastocal.loop.loading import described_campaign
-from elastocal.loop.schemas import measurements
+from elastocal.loop.diagnosis_tables import refit_step, serialize_diagnosis
+from elastocal.loop.loading import read_described_campaign
+from elastocal.loop.schemas import build_measurements_schema
 from elastocal.mechanics.robot_file import parse_robot
 from elastocal.random_streams import open_stream
 from elastocal.residual_model.regressions import REGRESSIONS
@@ -93,12 +93,12 @@ def load_data_set(
     joints = parse_robot(descriptions["robot"], descriptions["source"]).joints
     return DataSet(
         descriptions,
-        read_table(measurements_path, measurements(joints)),
+        read_table(measurements_path, build_measurements_schema(joints)),
         read_table(folds_path, FOLDS),
     )
 
 
-def dealt(
+def deal_folds(
     seen: Measurements, count: int, draws: np.random.Generator
 ) -> dict[str, np.ndarray]:
     """Columns (P,) of poses dealt into folds from 1, those of a configuration into one,
@@ -122,7 +122,7 @@ def dealt(
     }
 
 
-def rounds(
+def split_rounds(
     split: str, data: DataSet, others: Sequence[DataSet] = ()
 ) -> Iterator[tuple[int, Case, list[Case]]]:
     """Number, from 1, training poses, and held-out poses of each fold; of `SESSION`
@@ -137,7 +137,7 @@ def rounds(
         yield int(number), data.case(fold != number), [data.case(fold == number)]
 
 
-def method_from(described: Mapping[str, Any], name: str, source: str) -> Method:
+def parse_method(described: Mapping[str, Any], name: str, source: str) -> Method:
     """A method as a configuration describes it. Raises `InputError`: a regression that
     the catalogue does not have."""
     method = Method(**described)
@@ -151,13 +151,13 @@ def method_from(described: Mapping[str, Any], name: str, source: str) -> Method:
     return method
 
 
-def fitted_physics(physics: str, case: Case) -> Fit:
+def fit_physics(physics: str, case: Case) -> Fit:
     """Fit frames, or what the campaign declares, to training poses."""
     model = replace(case.model, effects=()) if physics == FRAMES else case.model
     return fit_declared_model(model, case.observations, estimate_noise(case)[0])
 
 
-def entered(
+def predict_held_out(
     method: Method, fitted: Fit, case: Case, held_out: Case, split: str, seed: int
 ) -> dict[str, np.ndarray]:
     """Columns (M,) of what a method, fitted to the poses of a case, predicts of
@@ -202,7 +202,7 @@ def entered(
     return columns
 
 
-def mechanism_columns(
+def tabulate_mechanisms(
     diagnosis: Diagnosis, fold: int
 ) -> dict[str, np.ndarray | list[str]]:
     """Columns of the mechanisms table (K,) of one fold; none where the data are at
@@ -217,7 +217,7 @@ def mechanism_columns(
     if evidence := diagnosis.evidence:
         mechanisms = evidence.conclusion.mechanisms
         best = evidence.conclusion.best
-        problem = evidence.linearized.problem
+        problem = evidence.design.problem
         explained = (
             compute_explained_squares(problem, evidence.posterior.models[best.model])
             if best.named
@@ -239,7 +239,7 @@ def mechanism_columns(
 
 def deal_league_folds(job: Any) -> None:
     """A data set of the league, checked, with its poses dealt into folds."""
-    descriptions, campaign = described_campaign(
+    descriptions, campaign = read_described_campaign(
         read_campaign_folder(job.params.folder, job.params.robots)
     )
     seen = campaign.measurements
@@ -247,11 +247,13 @@ def deal_league_folds(job: Any) -> None:
     draws = open_stream(job.params.seed, job.wildcards.data, "league folds", 0)
     write_table(
         job.output.measurements,
-        measurements(seen.joint_angles.shape[1]),
+        build_measurements_schema(seen.joint_angles.shape[1]),
         [tabulate_measurements(seen)],
         origin,
     )
-    write_table(job.output.folds, FOLDS, [dealt(seen, job.params.folds, draws)], origin)
+    write_table(
+        job.output.folds, FOLDS, [deal_folds(seen, job.params.folds, draws)], origin
+    )
     write_json(job.output.descriptions, descriptions)
 
 
@@ -263,10 +265,10 @@ def diagnose_league_folds(job: Any) -> None:
     )
     facts = {}
     mechanisms = []
-    for fold, training, _ in rounds(job.wildcards.split, data):
+    for fold, training, _ in split_rounds(job.wildcards.split, data):
         found = diagnose(training, Settings(), job.params.seed)
-        facts[str(fold)] = diagnosis_facts(found)["steps"][-1]
-        mechanisms.append(mechanism_columns(found, fold))
+        facts[str(fold)] = serialize_diagnosis(found)["steps"][-1]
+        mechanisms.append(tabulate_mechanisms(found, fold))
     write_json(job.output.facts, facts)
     write_table(
         job.output.mechanisms,
@@ -279,20 +281,20 @@ def diagnose_league_folds(job: Any) -> None:
 def enter_league(job: Any) -> None:
     """What one method predicts of the poses of each fold, which it has not seen."""
     split = job.wildcards.split
-    method = method_from(job.params.method, job.wildcards.method, "config.yaml")
+    method = parse_method(job.params.method, job.wildcards.method, "config.yaml")
     steps = read_json(job.input.facts) if method.physics == DIAGNOSIS else {}
     data, *others = map(
         load_data_set, job.input.descriptions, job.input.measurements, job.input.folds
     )
     blocks = []
-    for fold, training, tests in rounds(split, data, others):
+    for fold, training, tests in split_rounds(split, data, others):
         fitted = (
-            step_fit(training, steps[str(fold)])
+            refit_step(training, steps[str(fold)])
             if steps
-            else fitted_physics(method.physics, training)
+            else fit_physics(method.physics, training)
         )
         for number, held_out in enumerate(tests, 1 if others else 0):
-            columns = entered(
+            columns = predict_held_out(
                 method, fitted, training, held_out, split, job.params.seed
             )
             count = len(columns["pose"])

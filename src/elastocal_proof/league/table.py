@@ -40,7 +40,7 @@ _FOUND = (
 _LEAST_PROBABLE = 0.05
 
 
-def league_table(
+def compare_methods(
     entries: Entries, robots: Mapping[str, Sequence[str]], reference: str, seed: int
 ) -> pd.DataFrame:
     """One row for each data set, split and method, all of whose methods predict the
@@ -108,7 +108,7 @@ def league_table(
     return pd.DataFrame(rows)
 
 
-def mechanism_table(
+def summarize_mechanisms(
     found: Mapping[str, pd.DataFrame], robots: Mapping[str, Sequence[str]], folds: int
 ) -> pd.DataFrame:
     """Mechanisms of each data set over the diagnoses of its folds: mean, least and
@@ -145,7 +145,7 @@ def _covered(entries: pd.DataFrame) -> float:
     )
 
 
-def league_page(
+def format_league_page(
     table: pd.DataFrame,
     mechanisms: pd.DataFrame,
     methods: Mapping[str, Method],
@@ -188,7 +188,9 @@ def league_page(
             parts += [
                 f"## {title}",
                 winners,
-                folded(_ERRORS, _wide(mine, ["data", "poses"], words, error)),
+                format_collapsible(
+                    _ERRORS, _wide(mine, ["data", "poses"], words, error)
+                ),
             ]
     stated = table.dropna(subset="covered")
     # The middle of the coverages of each method, and their range.
@@ -201,7 +203,7 @@ def league_page(
         f"Median over data sets and splits: {'; '.join(medians)}.",
     ]
     parts += [
-        folded(
+        format_collapsible(
             _COVERED,
             _wide(
                 stated,
@@ -211,17 +213,17 @@ def league_page(
             ),
         )
     ]
-    parts += ["## Mechanisms", folded(_FOUND, _mechanisms(mechanisms))]
+    parts += ["## Mechanisms", format_collapsible(_FOUND, _mechanisms(mechanisms))]
     return "\n\n".join(parts) + "\n"
 
 
-def folded(title: str, table: str) -> str:
+def format_collapsible(title: str, table: str) -> str:
     """A table that a reader opens, under a title, as the Markdown of GitHub and of
     MyST."""
     return f"<details><summary>{title}</summary>\n\n{table}\n\n</details>"
 
 
-def markdown(rows: list[dict[str, Any]]) -> str:
+def format_table(rows: list[dict[str, Any]]) -> str:
     """A table of which each row has its cells by the heads of their columns."""
     return (
         pd.DataFrame(rows).fillna("").to_markdown(index=False, disable_numparse=True)
@@ -244,7 +246,7 @@ def _wide(
             head: _words(each[head]) if head == "data" else each[head] for head in heads
         }
         rows.setdefault(key, named)[words[each["method"]]] = cell(each)
-    return markdown([*rows.values()])
+    return format_table([*rows.values()])
 
 
 def _lead(table: pd.DataFrame, ours: set[str]) -> str:
@@ -283,7 +285,7 @@ def _mechanisms(table: pd.DataFrame) -> str:
                     "share of the squared error": f"{share:.0f} % ({low:.0f}–{high:.0f})"
                 }
             )
-    return markdown(rows)
+    return format_table(rows)
 
 
 def _words(name: str) -> str:

@@ -1,7 +1,7 @@
-"""A physical robot to be blind about: MuJoCo statics with defects, its tracker, its
-load cell, and the campaigns made with it.
+"""A simulated robot for the blind benchmark: MuJoCo statics with defects, its laser
+tracker, its load cell, and the campaigns measured with them.
 
-Of elastocal only `errors` is imported, and the laws of the defects are on purpose not
-those of the catalogue, so that an agreement of the two is a finding and not the same
-line of code run twice.
+The package imports nothing of elastocal but `errors`, and its defects follow other laws
+than the effects of the catalogue. If the analysis agrees with the simulation, this is a
+result and not the same line of code run twice.
 """

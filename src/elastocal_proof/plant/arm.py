@@ -1,9 +1,8 @@
-"""An arm as its robot file describes it, read by a parser of its own, and what its
-links weigh.
+"""Read the arm of a robot file with a parser of its own, and say what its links weigh.
 
 The file's chain is a product of elementary transforms, ``Tz(l1) Rz(q1) Tx(l2) [2DoF]
-...``. Here it becomes a list of rigid stretches with a drive between each two of them,
-which is what a multibody model is built from.
+...``. This module turns it into a list of rigid links with one drive between each pair
+of neighbours, which is what a multibody model is built from.
 """
 
 from __future__ import annotations
@@ -22,41 +21,57 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.errors import InputError
 
-_USUAL_RATIOS = (191.25, 171.74, 153.4, 129.6, 118.9, 101.0, 101.0)
-# What counts as heavy, and gears as stiff as a heavy arm's.
-_HEAVY_KG = 140.0
-_STIFF_RAD_PER_NM = 2e-6
-# A file without compliances is of an arm whose gears wind up by two milliradians under
-# the rated load at the longest lever, of 0.2 m at least: what makers of cycloidal and
-# strain wave gears state for the rated torque, 3 to 7 arc minutes.
+# Gear ratios of an arm whose file declares none: those of a heavy industrial arm.
+_TYPICAL_GEAR_RATIOS = (191.25, 171.74, 153.4, 129.6, 118.9, 101.0, 101.0)
+# Payload and joint compliance of a heavy arm, to which other arms are compared.
+_HEAVY_PAYLOAD_KG = 140.0
+_HEAVY_COMPLIANCE_RAD_PER_NM = 2e-6
+# If a file declares no compliances, the gears wind up by two milliradians under the
+# rated load at the longest lever. Makers of cycloidal and strain wave gears state 3 to
+# 7 arc minutes at the rated torque. Lower bounds on the lever and on the load keep the
+# compliance finite.
 _WIND_UP_RAD = 2e-3
-_SHORTEST_LEVER_M = 0.2
-_LEAST_KG = 1.0
-_WORD = re.compile(r"([TR])([xyz])\((-?)([\w.]+)\)|\[([^\]]+)\]")
-# Mass of an arm by rated load (kg) times reach (m): m = 3.2 (P R)^0.92 goes through an
-# arm of 30 kg for 14 kg at 0.82 m and has 1380 kg for 270 kg at 2.7 m, where a data
-# sheet has 1130: a size to be expected, not the mass of one machine.
-_SCALE_KG = 3.2
-_POWER = 0.92
-# Of it in the foot and in the carousel with its motors; the rest halves from link to
-# link.
-_FOOT = 0.18
-_CAROUSEL = 0.27
-_FALL = 0.5
-_ALONG = 0.45
-_ASIDE = 0.01
+_MIN_LEVER_M = 0.2
+_MIN_PAYLOAD_KG = 1.0
+_CHAIN_TERM = re.compile(r"([TR])([xyz])\((-?)([\w.]+)\)|\[([^\]]+)\]")
+# Mass of an arm by payload P (kg) and reach R (m): m = 3.2 (P R)^0.92. It fits an arm of
+# 30 kg for 14 kg at 0.82 m and gives 1380 kg for 270 kg at 2.7 m, where a data sheet
+# states 1130 kg: an order of magnitude, not the mass of one machine.
+_MASS_SCALE_KG = 3.2
+_MASS_EXPONENT = 0.92
+# Shares of the mass in the foot and in the carousel with its motors. The other links
+# share the remainder, each half as heavy as the one before.
+_FOOT_SHARE = 0.18
+_CAROUSEL_SHARE = 0.27
+_LINK_MASS_RATIO = 0.5
+# Centres lie before the middle of the link (share of its length) and a little to the
+# side (share of the reach), where the motors sit.
+_CENTRE_ALONG = 0.45
+_CENTRE_ASIDE = 0.01
+# Relative standard deviation of a declared mass, if the file states none.
 _RELATIVE_STD = 0.1
-# A centre that lies on its joint's axis is known no better than this.
-_SHORTEST_CENTRE_M = 0.1
-# Standard deviations; beyond them nobody's declaration would be believed.
-_FARTHEST = 3.0
+# Lower bound on the distance that scales the uncertainty of a centre: a centre on its
+# joint's axis is not known exactly.
+_MIN_CENTRE_DISTANCE_M = 0.1
+# Largest deviation of a mass or centre, in standard deviations. Beyond it nobody would
+# believe the declaration.
+_MAX_DEVIATION = 3.0
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """What is rigid between two drives: vector (3,) from its near to its far end,
-    rotation (3, 3) of the frame at its far end, and places (3,) and rotations (3, 3) of
-    its measuring points by their names, all in the frame at its near end."""
+class Link:
+    """A rigid body between two drives; the first one is the column.
+
+    Attributes
+    ----------
+    vector_m : (3,) array
+        From the link's near end to its far end, in the frame at the near end.
+    rotation : (3, 3) array
+        Of the frame at the far end, in the frame at the near end.
+    points : dict
+        Measuring points by name: position (3,), m, and rotation (3, 3), in the frame at
+        the near end.
+    """
 
     vector_m: np.ndarray
     rotation: np.ndarray
@@ -65,13 +80,23 @@ class Stretch:
 
 @dataclass(frozen=True)
 class LinkMass:
-    """What one link weighs.
+    """Mass and centre of one link.
 
-    `link`: 0 is the column; k turns with joint k. `centre_m`: in the frame directly
-    behind the rotation of joint `link`; of the column in the axes of the base.
-    `relative_std`: of the mass; of each component of the centre as a share of its
-    distance. `along`: where on the link it sits, 0 at its near end, 1 at its far end;
-    None where it is nearest.
+    Attributes
+    ----------
+    link
+        Number of the link: 0 is the column, k turns with joint k.
+    mass_kg
+        Mass.
+    centre_m
+        In the frame directly behind the rotation of joint `link`; for the column in the
+        axes of the base.
+    relative_std
+        Standard deviation of the mass, and of each component of the centre as a share
+        of its distance.
+    along
+        Position on the link, from 0 at its near end to 1 at its far end; None for the
+        point nearest to the centre.
     """
 
     link: int
@@ -80,28 +105,52 @@ class LinkMass:
     relative_std: float = _RELATIVE_STD
     along: float | None = None
 
-    def centre_std_m(self, least_m: float = _SHORTEST_CENTRE_M) -> float:
-        """Standard deviation of each component of the declared centre, m, whose
-        distance counts as `least_m` at least."""
-        return self.relative_std * max(float(np.linalg.norm(self.centre_m)), least_m)
+    def centre_std_m(self, min_distance_m: float = _MIN_CENTRE_DISTANCE_M) -> float:
+        """Standard deviation of each component of the declared centre, m.
+
+        It is a share of the centre's distance, which counts as at least
+        `min_distance_m`.
+        """
+        distance = float(np.linalg.norm(self.centre_m))
+        return self.relative_std * max(distance, min_distance_m)
 
 
 @dataclass(frozen=True)
 class Arm:
-    """An arm, all fixed rotations and lengths sorted into stretches; what its file does
-    not state is usual for its size.
+    """An arm as its robot file declares it; undeclared values are typical of its size.
 
-    `stretches`: n + 1 of them: the column, and one behind each drive; `lengths_m` (n +
-    1,). `reach_m`: of all that joint 1 carries, stretched out. `axes` (n, 3): axis of
-    each drive with its sense, in the frame at the far end of the stretch before it.
-    `compliance` (n,): rad/(N m); a specimen has others. `softness`: how many times
-    softer these are than a heavy arm's, at least 1; `load_share`: how large its loads
-    are beside a heavy arm's, at most 1. `limits` (n, 2): rad. `masses`: as declared.
-    `gravity_m_s2`: in the axes of the base. `compensated`: by a gravity compensator at
-    the shoulder. `gear_ratio`: turns of the motor for one of each joint.
+    Attributes
+    ----------
+    links : tuple of n + 1 links
+        The column, and one link behind each drive.
+    lengths_m : (n + 1,) array
+        Length of each link.
+    reach_m : float
+        Sum of the lengths of all links that joint 1 moves.
+    axes : (n, 3) array
+        Axis of each drive with its sense, in the frame at the far end of the link
+        before it.
+    compliance : (n,) array
+        Declared joint compliances, rad/(N m); a specimen has other ones.
+    softness : float
+        Ratio of the compliances to those of a heavy arm, at least 1.
+    limits : (n, 2) array
+        Joint limits, rad.
+    masses : tuple of LinkMass
+        As declared.
+    gravity_m_s2 : tuple
+        In the axes of the base.
+    payload_kg : float
+        Rated load.
+    load_share : float
+        Ratio of the payload to that of a heavy arm, at most 1.
+    compensated : bool
+        Whether a gravity compensator acts at the shoulder.
+    gear_ratio : tuple
+        Turns of the motor per turn of the joint.
     """
 
-    stretches: tuple[Stretch, ...]
+    links: tuple[Link, ...]
     lengths_m: np.ndarray
     reach_m: float
     axes: np.ndarray
@@ -123,21 +172,30 @@ class Arm:
     @property
     def points(self) -> tuple[str, ...]:
         """Names of all measuring points, the flange last."""
-        return tuple(name for stretch in self.stretches for name in stretch.points)
+        return tuple(name for link in self.links for name in link.points)
 
 
-def arm_from_file(path: str | Path) -> Arm:
+def read_arm(path: str | Path) -> Arm:
     """Read a robot file that the analysis can read too."""
-    return arm_from_document(
-        yaml.safe_load(Path(path).read_text(encoding="utf-8")), Path(path).as_posix()
-    )
+    text = Path(path).read_text(encoding="utf-8")
+    return build_arm(yaml.safe_load(text), Path(path).as_posix())
 
 
-def arm_from_document(document: Mapping[str, Any], source: str = "robot") -> Arm:
-    """Make an arm of the contents of a robot file.
+def build_arm(document: Mapping[str, Any], source: str = "robot") -> Arm:
+    """Build an arm from the contents of a robot file.
 
-    `source`: named in errors. Raises `InputError`: a drive that shifts or that stands
-    in two places, or a controller that shows other angles than those of the joints.
+    Parameters
+    ----------
+    document
+        Contents of the file.
+    source
+        Name of the file for errors.
+
+    Raises
+    ------
+    InputError
+        If a drive is prismatic or appears twice, or if the controller displays other
+        angles than those of the joints.
     """
     if "reported_joints" in document:
         raise InputError(
@@ -146,152 +204,153 @@ def arm_from_document(document: Mapping[str, Any], source: str = "robot") -> Arm
             "other angles than the joints'",
             "none, of a robot that is simulated",
         )
-    stretches, axes = _stretches_of(
-        document["chain"], document.get("lengths_m", {}), source
-    )
-    n = len(axes)
-    lengths = np.array([np.linalg.norm(stretch.vector_m) for stretch in stretches])
+    links, axes = _parse_links(document["chain"], document.get("lengths_m", {}), source)
+    joints = len(axes)
+    lengths = np.array([np.linalg.norm(link.vector_m) for link in links])
     reach = float(sum(lengths[1:]))
     # Arms of 1 to 3 m carry 8 kg m^-3 times the cube of their reach.
     payload = document.get("payload_kg", 8.0 * reach**3)
-    behind = np.cumsum(lengths[:0:-1])[::-1]
-    compliance = _WIND_UP_RAD / (
-        standard_gravity
-        * max(payload, _LEAST_KG)
-        * np.maximum(behind, _SHORTEST_LEVER_M)
-    )
     if "compliance_urad_per_Nm" in document:
         compliance = 1e-6 * np.array(document["compliance_urad_per_Nm"], float)
-    masses = [
-        LinkMass(**mass | {"centre_m": tuple(map(float, mass["centre_m"]))})
-        for mass in document.get("masses", ())
+    else:
+        levers = np.cumsum(lengths[:0:-1])[::-1]
+        compliance = _WIND_UP_RAD / (
+            standard_gravity
+            * max(payload, _MIN_PAYLOAD_KG)
+            * np.maximum(levers, _MIN_LEVER_M)
+        )
+    declared_masses = [
+        LinkMass(**entry | {"centre_m": tuple(map(float, entry["centre_m"]))})
+        for entry in document.get("masses", ())
     ]
+    limits_deg = document.get("joint_limits_deg", [[-360.0, 360.0]] * joints)
+    typical_ratios = np.resize(_TYPICAL_GEAR_RATIOS, joints).tolist()
     return Arm(
-        stretches,
-        lengths,
-        reach,
-        axes,
-        compliance,
-        max(1.0, float(np.median(compliance)) / _STIFF_RAD_PER_NM),
-        np.radians(
-            np.array(document.get("joint_limits_deg", [[-360.0, 360.0]] * n), float)
+        links=links,
+        lengths_m=lengths,
+        reach_m=reach,
+        axes=axes,
+        compliance=compliance,
+        softness=max(1.0, float(np.median(compliance)) / _HEAVY_COMPLIANCE_RAD_PER_NM),
+        limits=np.radians(np.array(limits_deg, float)),
+        masses=tuple(declared_masses or _estimate_masses(links, payload, reach)),
+        gravity_m_s2=tuple(
+            map(float, document.get("gravity_m_s2", (0.0, 0.0, -standard_gravity)))
         ),
-        tuple(masses or _usual_masses(stretches, payload * reach, reach)),
-        tuple(map(float, document.get("gravity_m_s2", (0.0, 0.0, -standard_gravity)))),
-        payload,
-        min(1.0, payload / _HEAVY_KG),
-        # A file that declares no weights declares no compensator either.
-        "compensator" in document or not masses,
-        tuple(
-            document.get(
-                "gear_ratio",
-                [_USUAL_RATIOS[joint % len(_USUAL_RATIOS)] for joint in range(n)],
-            )
-        ),
+        payload_kg=payload,
+        load_share=min(1.0, payload / _HEAVY_PAYLOAD_KG),
+        # A file that declares no masses does not declare its compensator either.
+        compensated="compensator" in document or not declared_masses,
+        gear_ratio=tuple(document.get("gear_ratio", typical_ratios)),
     )
 
 
-def _usual_masses(
-    stretches: tuple[Stretch, ...], payload_times_reach: float, reach: float
+def _estimate_masses(
+    links: tuple[Link, ...], payload: float, reach: float
 ) -> list[LinkMass]:
-    """What the links of an arm weigh of which nobody says it."""
-    falling = _FALL ** np.arange(len(stretches) - 2)
-    shares = [_FOOT, _CAROUSEL, *((1.0 - _FOOT - _CAROUSEL) * falling / falling.sum())]
-    # Centres before the middle of the link, and a little to the side, where the motors
-    # sit; to the millimetre.
-    centres = [
-        np.round(_ALONG * stretch.vector_m + np.array([0.0, _ASIDE * reach, 0.0]), 3)
-        for stretch in stretches
-    ]
-    total = _SCALE_KG * payload_times_reach**_POWER
-    return [
-        LinkMass(link, round(float(share * total), 1), tuple(centres[link].tolist()))
-        for link, share in enumerate(shares)
-    ]
+    """Masses of the links of an arm whose file declares none."""
+    falling = _LINK_MASS_RATIO ** np.arange(len(links) - 2)
+    link_shares = (1.0 - _FOOT_SHARE - _CAROUSEL_SHARE) * falling / falling.sum()
+    total = _MASS_SCALE_KG * (payload * reach) ** _MASS_EXPONENT
+    aside = np.array([0.0, _CENTRE_ASIDE * reach, 0.0])
+    masses = []
+    for number, share in enumerate([_FOOT_SHARE, _CAROUSEL_SHARE, *link_shares]):
+        # To the millimetre and to 100 g, as somebody would declare them.
+        centre = np.round(_CENTRE_ALONG * links[number].vector_m + aside, 3)
+        masses.append(
+            LinkMass(number, round(float(share * total), 1), tuple(centre.tolist()))
+        )
+    return masses
 
 
-def _stretches_of(
+def _parse_links(
     chain: str, lengths: Mapping[str, float], source: str
-) -> tuple[tuple[Stretch, ...], np.ndarray]:
-    """Cut a chain at its drives."""
-    stretches: list[Stretch] = []
+) -> tuple[tuple[Link, ...], np.ndarray]:
+    """Cut a chain at its drives into links; return these and the axes (n, 3)."""
+    links: list[Link] = []
     axes: list[np.ndarray] = []
     position = np.zeros(3)
     rotation = np.eye(3)
     points = {}
-    for kind, axis, minus, argument, point in _WORD.findall(chain):
+    for kind, axis, minus, argument, point in _CHAIN_TERM.findall(chain):
         if point:
             points[point] = position, rotation
             continue
-        sign = -1.0 if minus else 1.0
-        direction = np.eye(3)["xyz".index(axis)]
-        if re.fullmatch(r"q\d+", argument) and (kind, argument) != (
-            "R",
-            f"q{len(axes) + 1}",
-        ):
-            found = f"{kind}{axis}({minus}{argument})"
-            raise InputError(
-                source,
-                "chain",
-                found,
-                f"drives that turn, each in one place: R.(q{len(axes) + 1})",
-            )
-        if kind == "T":
-            position = position + rotation @ (
-                sign * float(lengths.get(argument, argument)) * direction
-            )
-        elif argument.endswith("deg"):
-            rotation = rotation @ turned(
-                np.radians(sign * float(argument[:-3])) * direction
-            )
-        else:
-            stretches.append(Stretch(position, rotation, points))
-            axes.append(sign * direction)
+        direction = (-1.0 if minus else 1.0) * np.eye(3)["xyz".index(axis)]
+        if re.fullmatch(r"q\d+", argument):
+            expected = f"q{len(axes) + 1}"
+            if (kind, argument) != ("R", expected):
+                raise InputError(
+                    source,
+                    "chain",
+                    f"{kind}{axis}({minus}{argument})",
+                    f"drives that turn, each in one place: R.({expected})",
+                )
+            links.append(Link(position, rotation, points))
+            axes.append(direction)
             position = np.zeros(3)
             rotation = np.eye(3)
             points = {}
-    return (*stretches, Stretch(position, rotation, points)), np.array(axes)
+        elif kind == "T":
+            length = float(lengths.get(argument, argument))
+            position = position + rotation @ (length * direction)
+        else:
+            angle = np.radians(float(argument.removesuffix("deg")))
+            rotation = rotation @ to_rotation_matrix(angle * direction)
+    return (*links, Link(position, rotation, points)), np.array(axes)
 
 
-def turned(vector: ArrayLike) -> np.ndarray:
+def to_rotation_matrix(vector: ArrayLike) -> np.ndarray:
     """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), rad."""
     return Rotation.from_rotvec(np.array(vector, float)).as_matrix()
 
 
-def rotation_vector(rotation: np.ndarray) -> np.ndarray:
-    """Rotation vectors (..., 3), rad, of rotation matrices (..., 3, 3); angles up to
-    and at a half turn."""
-    # A product of two rotations is one but for rounding, which needs no other to be
-    # found for it.
+def to_rotation_vector(rotation: np.ndarray) -> np.ndarray:
+    """Rotation vectors (..., 3), rad, of rotation matrices (..., 3, 3).
+
+    Angles go up to a half turn, which is included.
+    """
+    # A product of two rotations is a rotation up to rounding, so scipy need not
+    # orthogonalise it.
     return Rotation.from_matrix(np.array(rotation), assume_valid=True).as_rotvec()
 
 
-def true_masses(
+def draw_true_masses(
     arm: Arm,
     draws: np.random.Generator,
-    off_line_m: float,
-    sideways: np.random.Generator,
+    max_offset_m: float,
+    offset_draws: np.random.Generator,
 ) -> tuple[LinkMass, ...]:
-    """Masses and centres of one specimen, drawn about the declared ones as well as
-    these are known.
+    """Draw masses and centres of one specimen around the declared ones.
 
-    `off_line_m`: by how much centres lie off the lines of their links at most, in each
-    direction across, as nobody declared.
+    Parameters
+    ----------
+    arm
+        Declares masses and their standard deviations.
+    draws, offset_draws
+        Random numbers of the declared uncertainty and of the undeclared offsets.
+    max_offset_m
+        Largest undeclared offset of a centre from the line of its link, in each
+        direction across the line.
     """
-    found = []
+    masses = []
     for mass in arm.masses:
-        heavier, *moved = np.clip(draws.standard_normal(4), -_FARTHEST, _FARTHEST)
-        centre = np.array(mass.centre_m) + mass.centre_std_m() * np.array(moved)
-        if off_line_m:
-            move = sideways.uniform(-off_line_m, off_line_m, 3)
-            vector = arm.stretches[mass.link].vector_m
-            along = vector / max(float(np.linalg.norm(vector)), 1e-300)
-            centre = centre + move - (move @ along) * along
-        found.append(
+        mass_deviation, *centre_deviation = np.clip(
+            draws.standard_normal(4), -_MAX_DEVIATION, _MAX_DEVIATION
+        )
+        centre = np.array(mass.centre_m) + mass.centre_std_m() * np.array(
+            centre_deviation
+        )
+        if max_offset_m:
+            offset = offset_draws.uniform(-max_offset_m, max_offset_m, 3)
+            vector = arm.links[mass.link].vector_m
+            axis = vector / max(float(np.linalg.norm(vector)), 1e-300)
+            centre = centre + offset - (offset @ axis) * axis
+        masses.append(
             replace(
                 mass,
-                mass_kg=mass.mass_kg * (1.0 + mass.relative_std * heavier),
+                mass_kg=mass.mass_kg * (1.0 + mass.relative_std * mass_deviation),
                 centre_m=tuple(centre),
             )
         )
-    return tuple(found)
+    return tuple(masses)

@@ -1,36 +1,37 @@
-"""Campaigns of a physical robot: what is done with it, the table of what is read, and
-rows of that which went wrong."""
+"""Campaigns of a simulated robot: what is done with it, the table of readings, and
+rows that are wrong by a blunder."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import cache
+from typing import Any, TypedDict
 
 import numpy as np
 
-from elastocal_proof.plant.arm import Arm, rotation_vector, turned
-from elastocal_proof.plant.laws import direction, sign
-from elastocal_proof.plant.physical_robot import (
-    PhysicalRobot,
+from elastocal_proof.plant.arm import Arm, to_rotation_matrix, to_rotation_vector
+from elastocal_proof.plant.laws import draw_direction, draw_sign
+from elastocal_proof.plant.simulated_robot import (
     Schedule,
-    logged_temperature,
-    seen_poses,
-    stream,
+    SimulatedRobot,
+    compute_logged_temperature,
+    open_simulation_stream,
+    simulate_poses,
 )
 
 Table = dict[str, np.ndarray]
-# Its kind, and of the table, from 0, the rows in which something wrong stands.
-Slip = dict[str, Any]
-
 COVARIATES = ("approach", "time", "temperature")
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
-_READ = ("x", "y", "z", "rx", "ry", "rz")
+_POSE_COLUMNS = ("x", "y", "z", "rx", "ry", "rz")
 SECONDS_PER_STATE = 25.0
-# From the flange to where the force acts, base axes, on arms of such a reach.
+# From the flange to the point where the force acts, base axes, on arms whose reach is at
+# least the second number. Shorter arms have a proportionally shorter lever.
 _LEVER_M = (0.0, 0.5, 0.0)
-_LONG_M = 2.5
-# What a lost beam, a slipped decimal point or a muddled sheet leave of a few rows.
-SLIPS = (
+_LONG_REACH_M = 2.5
+# Errors of few rows, such as those of a lost beam, a slipped decimal point or a muddled
+# sheet.
+BLUNDER_KINDS = (
     "position",
     "rotation",
     "joint_angle",
@@ -39,38 +40,64 @@ SLIPS = (
     "zeros",
     "swapped",
 )
-# How far off, in standard deviations of the tracker, evenly in the logarithm. Of a
-# wrong angle or load it is how far the robot would have stood, in the median row, from
-# where it was read had it been as the row says.
-_SMALLEST = 5.0
-_LARGEST = 1e5
-# A campaign's reader refuses rows of one pose whose angles differ by more than 0.02
-# rad: beyond this the whole pose has the angle, as in a sheet that has the angles of
-# each pose once.
-_OF_ONE_ROW_RAD = 0.019
-# A wrong load is at most so many times the largest one; a joint is drawn among those
-# that move a point by more than this.
-_LARGEST_LOAD = 100.0
-_LEAST_LEVER_M = 0.01
+# Range of the size of a blunder, log-uniform, in standard deviations of the tracker. The
+# size of a wrong angle or load is how far it would move a target in the median row.
+_MIN_SIZE = 5.0
+_MAX_SIZE = 1e5
+# The reader of a campaign refuses rows of one pose whose angles differ by more than 0.02
+# rad. A larger blunder therefore affects the whole pose, as in a sheet that lists the
+# angles of each pose once.
+_MAX_SINGLE_ROW_RAD = 0.019
+# Upper bound on a wrong load, as a multiple of the largest one.
+_MAX_LOAD_FACTOR = 100.0
+# A wrong angle is drawn for a joint that moves a target by more than this per radian;
+# the step is that of the numerical derivative.
+_MIN_LEVER_M = 0.01
 _STEP_RAD = 1e-4
-# A wrong angle, its opposite, or as much as leaves the joints within their limits: a
-# controller shows no others.
-_SHARES = np.outer(2.0 ** -np.arange(40), [1.0, -1.0]).ravel()
+# A wrong angle may have to change its sign or to be halved, again and again, to stay
+# within the joint limits, because a controller reports no other angles.
+_FEASIBLE_SHARES = np.outer(2.0 ** -np.arange(40), [1.0, -1.0]).ravel()
+
+
+class Blunder(TypedDict):
+    """One blunder: its kind, and the rows of the table, from 0, that it made wrong."""
+
+    kind: str
+    rows: tuple[int, ...]
 
 
 @dataclass(frozen=True)
 class Design:
-    """How a campaign is made, and what is written down of it.
+    """How a campaign is measured, and what is written down about it.
 
-    `held_out`: the last poses. `force_times`: how many times the force is pulled that
-    suits the arm, of a random direction in each pose. `ladder`: shares of it, 0 first:
-    each is a load. `repeats`, `repeated_poses`: how often loads 0 and 1 of the first
-    poses are read. `approach_each_load`: whether each load is approached afresh;
-    otherwise loads of one pose follow each other without a move. `points`: measuring
-    points with a target each; empty for all. `covariates`: which are written down.
-    `declared_noise`: standard deviations that the campaign claims, m and rad.
-    `declared`: effects that its model has. `measured`: "pose" or "position". `frame`:
-    "base" or "tracker". `undeclared`: keys that the analyst's robot file lacks.
+    Attributes
+    ----------
+    poses, held_out
+        Number of poses, and of the last ones that are held out.
+    force_times
+        Multiple of the typical force of the arm. Each pose has its own random
+        direction.
+    ladder
+        Shares of this force, 0 first; each is a load.
+    repeats, repeated_poses
+        How often loads 0 and 1 are read at the first poses, and number of these.
+    approach_each_load
+        Whether the robot moves away and back before each load. Otherwise the loads of a
+        pose follow each other without a move.
+    points
+        Measuring points with a target; empty for all.
+    covariates
+        Covariates that are written down, of `COVARIATES`.
+    declared_noise
+        Standard deviations that the campaign claims, m and rad.
+    declared
+        Effects of the campaign's declared model.
+    measured
+        "pose" or "position".
+    frame
+        "base" or "tracker".
+    undeclared
+        Keys that the analyst's robot file lacks.
     """
 
     poses: int = 30
@@ -89,247 +116,242 @@ class Design:
     undeclared: tuple[str, ...] = ()
 
 
-def usual_force_N(arm: Arm) -> float:  # noqa: N802 - units in names keep their case
-    """A kilonewton on arms that carry 140 kg and more, and as much less on smaller
-    ones."""
+def get_typical_force_N(arm: Arm) -> float:  # noqa: N802 - units in names keep their case
+    """One kilonewton on arms that carry 140 kg and more, proportionally less on others."""
     return 1000.0 * arm.load_share
 
 
-def schedule_of(arm: Arm, design: Design, seed: int) -> Schedule:
-    """Draw what is done."""
-    draws = stream(seed, "schedule")
+def draw_schedule(arm: Arm, design: Design, seed: int) -> Schedule:
+    """Draw the states into which a campaign brings a robot."""
+    draws = open_simulation_stream(seed, "schedule")
     low, high = arm.limits.T
     angles = low + (high - low) * draws.random((design.poses, arm.joints))
-    pull = draws.standard_normal((design.poses, 3))
-    pull /= np.linalg.norm(pull, axis=1, keepdims=True)
-    states = [
-        (place, rung, again)
-        for place in range(design.poses)
-        for again in range(design.repeats if place < design.repeated_poses else 1)
-        for rung in range(
-            len(design.ladder) if again == 0 else min(2, len(design.ladder))
-        )
-    ]
+    direction = draws.standard_normal((design.poses, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    states = []
+    for pose in range(design.poses):
+        states += [(pose, load, 0) for load in range(len(design.ladder))]
+        if pose < design.repeated_poses:
+            states += [
+                (pose, load, repeat)
+                for repeat in range(1, design.repeats)
+                for load in range(min(2, len(design.ladder)))
+            ]
     pose, load, repeat = np.array(states).T
-    fresh = design.approach_each_load | (load == 0)
+    moved = design.approach_each_load | (load == 0)
     number = np.arange(len(states))
-    # A repeat comes from the same side, so that it is one: what differs between repeats
-    # is then chance and not friction.
+    # Repeats come from the same side, so that they differ by chance and not by
+    # friction.
     sense = draws.choice([-1, 1], (design.poses, len(design.ladder), arm.joints))
+    force_N = design.force_times * get_typical_force_N(arm)
+    lever = min(arm.reach_m / _LONG_REACH_M, 1.0) * np.array(_LEVER_M)
     return Schedule(
         angle=angles[pose],
-        force=design.force_times
-        * usual_force_N(arm)
-        * np.array(design.ladder)[load, None]
-        * pull[pose],
-        lever=np.tile(
-            min(arm.reach_m / _LONG_M, 1.0) * np.array(_LEVER_M), (len(states), 1)
-        ),
+        force=force_N * np.array(design.ladder)[load, None] * direction[pose],
+        lever=np.tile(lever, (len(states), 1)),
         pose=pose,
         load=load,
         repeat=repeat,
-        approach=fresh.cumsum() - 1,
+        approach=moved.cumsum() - 1,
         sense=sense[pose, load if design.approach_each_load else 0 * load],
-        previous=np.where(fresh, -1, number - 1),
+        previous=np.where(moved, -1, number - 1),
         time_s=SECONDS_PER_STATE * (number + 1),
         training=pose < design.poses - design.held_out,
         seed=int(seed),
     )
 
 
-def measured_table(robot: PhysicalRobot, design: Design, schedule: Schedule) -> Table:
-    """Columns of the file of measurements (rows,)."""
+def simulate_measurements(
+    robot: SimulatedRobot, design: Design, schedule: Schedule
+) -> Table:
+    """Simulate the file of measurements: its columns (rows,) by name."""
     position, rotation = robot.tracker.read(
-        *seen_poses(robot, schedule), stream(schedule.seed, "readings")
+        *simulate_poses(robot, schedule),
+        open_simulation_stream(schedule.seed, "readings"),
     )
     if design.frame == "tracker":
-        position, rotation = robot.tracker.in_own_frame(position, rotation)
+        position, rotation = robot.tracker.to_tracker_frame(position, rotation)
     points = design.points or robot.arm.points
-    at = [robot.arm.points.index(name) for name in points]
-    joints = range(1, robot.arm.joints + 1)
+    moment = np.cross(schedule.lever, schedule.force)
     columns = {name: getattr(schedule, name) for name in ("pose", "load", "repeat")}
-    columns |= dict(zip([f"q{j}" for j in joints], schedule.angle.T, strict=True))
-    columns |= dict(
-        zip(
-            WRENCH,
-            [*schedule.force.T, *np.cross(schedule.lever, schedule.force).T],
-            strict=True,
-        )
-    )
+    columns |= _name_columns(_list_joint_columns("q", robot.arm), schedule.angle)
+    columns |= _name_columns(WRENCH, np.hstack([schedule.force, moment]))
     if "approach" in design.covariates:
-        columns |= dict(
-            zip(
-                [f"approach{j}" for j in joints],
-                schedule.sense.T.astype(float),
-                strict=True,
-            )
-        )
+        names = _list_joint_columns("approach", robot.arm)
+        columns |= _name_columns(names, schedule.sense.astype(float))
     if "time" in design.covariates:
         columns["time_s"] = schedule.time_s
     if "temperature" in design.covariates:
-        columns["temperature_c"] = logged_temperature(schedule.time_s)
-    # State by state, as a tracker goes round its targets.
+        columns["temperature_c"] = compute_logged_temperature(schedule.time_s)
+    # State by state, because a tracker visits all targets of a state in turn.
     table = {name: np.repeat(column, len(points)) for name, column in columns.items()}
     table["target"] = np.tile(points, len(schedule.pose))
-    read = np.concatenate([position, rotation_vector(rotation)], axis=2)[:, at].reshape(
-        -1, 6
+    readings = np.concatenate([position, to_rotation_vector(rotation)], axis=2)
+    indices = [robot.arm.points.index(name) for name in points]
+    measured = _POSE_COLUMNS if design.measured == "pose" else _POSE_COLUMNS[:3]
+    table |= _name_columns(
+        measured, readings[:, indices, : len(measured)].reshape(-1, len(measured))
     )
-    table |= dict(
-        zip(_READ[: 6 if design.measured == "pose" else 3], read.T, strict=False)
-    )
-    # Minus zeros are products of the ladder's zero and mean nothing.
+    # Adding zero removes minus zeros: products with the zero load, which mean nothing.
     return {
         name: column + 0.0 if column.dtype.kind == "f" else column
         for name, column in table.items()
     }
 
 
-def with_bad_rows(
+def _list_joint_columns(name: str, arm: Arm) -> list[str]:
+    return [f"{name}{joint}" for joint in range(1, arm.joints + 1)]
+
+
+def _name_columns(names: Iterable[str], columns: np.ndarray) -> Table:
+    return dict(zip(names, columns.T, strict=True))
+
+
+def add_blunders(
     table: Table,
-    robot: PhysicalRobot,
+    robot: SimulatedRobot,
     schedule: Schedule,
     kind: str,
     count: int,
     draws: np.random.Generator,
-) -> tuple[Table, list[Slip]]:
-    """A measured table in which some rows, of different poses, are wrong; of swapped
-    ones always two.
+) -> tuple[Table, list[Blunder]]:
+    """Make some rows of a measured table wrong, each of a different pose.
 
-    `table`: as `measured_table` gives it for this robot and schedule. `kind`: of
-    `SLIPS`, and of what the table has.
+    Parameters
+    ----------
+    table, robot, schedule
+        The table that `simulate_measurements` returns for this robot and schedule.
+    kind
+        One of `BLUNDER_KINDS`, for columns that the table has.
+    count
+        Number of blunders; two rows are always swapped.
+    draws
+        Random numbers.
     """
-    some = (
-        np.flatnonzero(table["load"])
-        if kind == "load"
-        else np.arange(kind == "held_point", len(table["pose"]))
-    )
-    mixed = draws.permutation(some)
-    first = np.sort(np.unique(table["pose"][mixed], return_index=True)[1])[
-        : 2 if kind == "swapped" else count
-    ]
-    rows = sorted(int(row) for row in mixed[first])
-    bad = {name: column.copy() for name, column in table.items()}
-    # How far off each row is, in standard deviations.
-    sizes = _SMALLEST * (_LARGEST / _SMALLEST) ** draws.random(len(rows))
+    if kind == "load":
+        eligible = np.flatnonzero(table["load"])
+    else:
+        # The first row has none before it whose point could be held.
+        eligible = np.arange(kind == "held_point", len(table["pose"]))
+    shuffled = draws.permutation(eligible)
+    first_of_pose = np.sort(np.unique(table["pose"][shuffled], return_index=True)[1])
+    count = 2 if kind == "swapped" else count
+    rows = sorted(shuffled[first_of_pose[:count]].tolist())
+    sizes = _MIN_SIZE * (_MAX_SIZE / _MIN_SIZE) ** draws.random(len(rows))
+    wrong_table = {name: column.copy() for name, column in table.items()}
     if kind in ("joint_angle", "load"):
-        wrong = _wrong_angles if kind == "joint_angle" else _wrong_loads
-        return bad, [
-            {"kind": kind, "rows": found}
-            for found in wrong(bad, robot, schedule, rows, sizes, draws)
-        ]
-    read = [name for name in _READ if name in table]
-    before = np.array([table[name] for name in read])
-    after = before.copy()
-    for row, other, size in zip(rows, rows[::-1], sizes, strict=True):
-        if kind == "position":
-            after[:3, row] += size * robot.tracker.sigma_m * direction(draws)
-        elif kind == "rotation":
-            turn = min(size * robot.tracker.sigma_rad, np.pi) * direction(draws)
-            after[3:, row] = rotation_vector(turned(turn) @ turned(before[3:, row]))
-        else:
-            after[:, row] = (
-                0.0
-                if kind == "zeros"
-                else before[:, row - 1 if kind == "held_point" else other]
+        change = _change_angles if kind == "joint_angle" else _change_loads
+        changed = change(wrong_table, robot, schedule, rows, sizes, draws)
+        return wrong_table, [{"kind": kind, "rows": group} for group in changed]
+    names = [name for name in _POSE_COLUMNS if name in table]
+    readings = np.array([table[name] for name in names])
+    wrong = readings.copy()
+    if kind == "zeros":
+        wrong[:, rows] = 0.0
+    elif kind == "held_point":
+        wrong[:, rows] = readings[:, np.array(rows) - 1]
+    elif kind == "swapped":
+        wrong[:, rows] = readings[:, rows[::-1]]
+    elif kind == "position":
+        for row, size in zip(rows, sizes, strict=True):
+            wrong[:3, row] += size * robot.tracker.sigma_m * draw_direction(draws)
+    else:
+        for row, size in zip(rows, sizes, strict=True):
+            angle = min(size * robot.tracker.sigma_rad, np.pi)
+            turn = to_rotation_matrix(angle * draw_direction(draws))
+            wrong[3:, row] = to_rotation_vector(
+                turn @ to_rotation_matrix(readings[3:, row])
             )
-    return bad | dict(zip(read, after, strict=True)), [
-        {"kind": kind, "rows": (row,)} for row in rows
-    ]
+    wrong_table |= _name_columns(names, wrong.T)
+    return wrong_table, [{"kind": kind, "rows": (row,)} for row in rows]
 
 
-def _seen(
-    table: Table, robot: PhysicalRobot, schedule: Schedule, **changes: Any
+def _observe_rows(
+    table: Table, robot: SimulatedRobot, schedule: Schedule, **changes: Any
 ) -> np.ndarray:
-    """Where a tracker without noise sees each row's target, had the schedule been
-    another."""
+    """Position (rows, 3) of each row's target under a changed schedule, without
+    noise."""
     targets = table["target"]
     points = np.array([robot.arm.points.index(name) for name in targets])
     states = np.arange(len(targets)) // len(np.unique(targets))
-    return seen_poses(robot, replace(schedule, **changes))[0][states, points]
+    return simulate_poses(robot, replace(schedule, **changes))[0][states, points]
 
 
-def _wrong_angles(
-    bad: Table,
-    robot: PhysicalRobot,
+def _change_angles(
+    table: Table,
+    robot: SimulatedRobot,
     schedule: Schedule,
     rows: list[int],
     sizes: np.ndarray,
     draws: np.random.Generator,
 ) -> list[tuple[int, ...]]:
-    arm, names, found = (
-        robot.arm,
-        [f"q{joint}" for joint in range(1, robot.arm.joints + 1)],
-        [],
-    )
-    before = _seen(bad, robot, schedule)
-    levers = dict[int, float]()
+    """Make one joint angle wrong for each row; return the rows that this changed."""
+    arm = robot.arm
+    names = _list_joint_columns("q", arm)
+    position = _observe_rows(table, robot, schedule)
+
+    @cache
+    def compute_lever_m(joint: int) -> float:
+        """How far the joint moves the target of the median row, per radian."""
+        angle = schedule.angle + _STEP_RAD * np.eye(arm.joints)[joint]
+        shift = _observe_rows(table, robot, schedule, angle=angle) - position
+        return float(np.median(np.linalg.norm(shift, axis=1))) / _STEP_RAD
+
+    changed = []
     for row, size in zip(rows, sizes, strict=True):
         for joint in draws.permutation(arm.joints):
-            if joint not in levers:
-                # By how much the joint moves a measured point in the median row.
-                step = _STEP_RAD * np.eye(arm.joints)[joint]
-                moved = np.linalg.norm(
-                    _seen(bad, robot, schedule, angle=schedule.angle + step) - before,
-                    axis=1,
-                )
-                levers[joint] = float(np.median(moved)) / _STEP_RAD
-            if levers[joint] > _LEAST_LEVER_M:
+            lever_m = compute_lever_m(joint)
+            if lever_m > _MIN_LEVER_M:
                 break
-        off = (
-            _SHARES
-            * min(size * robot.tracker.sigma_m / levers[joint], np.pi)
-            * sign(draws)
-        )
-        angles = np.tile([bad[name][row] for name in names], (len(off), 1))
-        angles[:, joint] += off
-        chosen = off[
-            np.argmax(
-                ((angles >= arm.limits[:, 0]) & (angles <= arm.limits[:, 1])).all(
-                    axis=1
-                )
-            )
-        ]
-        found.append(_rows_of_slip(bad, row, abs(chosen) > _OF_ONE_ROW_RAD, draws))
-        bad[names[joint]][list(found[-1])] += chosen
-    return found
+        error = min(size * robot.tracker.sigma_m / lever_m, np.pi) * draw_sign(draws)
+        # Of these errors, which begin with the largest, the first feasible one counts.
+        errors = _FEASIBLE_SHARES * error
+        angles = table[names[joint]][row] + errors
+        low, high = arm.limits[joint]
+        error = errors[np.argmax((angles >= low) & (angles <= high))]
+        if abs(error) > _MAX_SINGLE_ROW_RAD:
+            same_pose = np.flatnonzero(table["pose"] == table["pose"][row])
+            changed.append(tuple(same_pose.tolist()))
+        else:
+            changed.append(_draw_changed_rows(table, row, draws))
+        table[names[joint]][list(changed[-1])] += error
+    return changed
 
 
-def _wrong_loads(
-    bad: Table,
-    robot: PhysicalRobot,
+def _change_loads(
+    table: Table,
+    robot: SimulatedRobot,
     schedule: Schedule,
     rows: list[int],
     sizes: np.ndarray,
     draws: np.random.Generator,
 ) -> list[tuple[int, ...]]:
-    """Loads of the same line and another size, as by a slipped decimal point or a wrong
-    unit."""
+    """Scale the load of each row, as a slipped decimal point or a wrong unit does, and
+    return the rows that this changed."""
     force = np.linalg.norm(schedule.force, axis=1)
-    targets = len(np.unique(bad["target"]))
-    found = []
-    without = _seen(bad, robot, schedule, force=np.zeros_like(schedule.force))
-    usual_m = float(
-        np.median(
-            np.linalg.norm(_seen(bad, robot, schedule) - without, axis=1)[
-                bad["load"] != 0
-            ]
-        )
+    targets = len(np.unique(table["target"]))
+    unloaded = _observe_rows(
+        table, robot, schedule, force=np.zeros_like(schedule.force)
     )
+    shift = np.linalg.norm(_observe_rows(table, robot, schedule) - unloaded, axis=1)
+    median_shift_m = float(np.median(shift[table["load"] != 0]))
+    changed = []
     for row, size in zip(rows, sizes, strict=True):
-        most = _LARGEST_LOAD * force.max() / force[row // targets]
-        share = min(size * robot.tracker.sigma_m / usual_m, most) * sign(draws)
-        found.append(_rows_of_slip(bad, row, False, draws))
+        max_share = _MAX_LOAD_FACTOR * force.max() / force[row // targets]
+        share = min(size * robot.tracker.sigma_m / median_shift_m, max_share)
+        share = share * draw_sign(draws)
+        changed.append(_draw_changed_rows(table, row, draws))
         for name in WRENCH:
-            bad[name][list(found[-1])] *= 1.0 + share
-    return found
+            table[name][list(changed[-1])] *= 1.0 + share
+    return changed
 
 
-def _rows_of_slip(
-    table: Table, row: int, whole_pose: bool, draws: np.random.Generator
+def _draw_changed_rows(
+    table: Table, row: int, draws: np.random.Generator
 ) -> tuple[int, ...]:
-    """Rows that got a wrong entry: of the whole pose; or by chance of all targets of
-    one reading, or the row alone."""
-    names = ("pose",) if whole_pose else ("pose", "load", "repeat")
+    """By chance the row alone, or all targets of the same reading."""
+    if draws.integers(2):
+        return (row,)
+    names = ("pose", "load", "repeat")
     same = np.all([table[name] == table[name][row] for name in names], axis=0)
-    alone = not whole_pose and draws.integers(2)
-    return (row,) if alone else tuple(int(other) for other in np.flatnonzero(same))
+    return tuple(np.flatnonzero(same).tolist())

@@ -16,8 +16,11 @@ import numpy as np
 
 from elastocal_proof.plant import laws
 from elastocal_proof.plant.arm import Arm
-from elastocal_proof.plant.machine import each_link, weighing_links
-from elastocal_proof.plant.physical_robot import PhysicalRobot, stream
+from elastocal_proof.plant.multibody import (
+    find_distinguishable_weights,
+    list_flexible_links,
+)
+from elastocal_proof.plant.simulated_robot import SimulatedRobot, open_simulation_stream
 
 OUTSIDE = "outside:"
 Location = tuple[int, ...]
@@ -37,12 +40,12 @@ class Kind:
     unit: str
     plausible: float
     locations: Callable[[Arm], list[Location]]
-    apply: Callable[..., laws.Applied]
+    apply: Callable[..., laws.DefectiveRobot]
     needs: tuple[str, ...] = ()
     largest: float = np.inf
     scale: tuple[float, float] = (0.0, 0.0)
 
-    def plausible_on(self, arm: Arm) -> float:
+    def scale_plausible_size(self, arm: Arm) -> float:
         """A size such as this arm may have; `plausible` is a heavy one's."""
         return (
             self.plausible
@@ -72,12 +75,16 @@ KINDS: dict[str, Kind] = {
     "link_geometry": Kind("m", 3e-4, _joints(1), laws.link_geometry),
     # A wrong wavelength, at which the frame of the base was measured too.
     "tracker_scale": Kind(
-        "1", 2e-5, _nowhere, partial(laws.misread, "tracker", "scale")
+        "1", 2e-5, _nowhere, partial(laws.set_instrument_error, "tracker", "scale")
     ),
     "link_weight": Kind(
-        "kg", 100.0, lambda arm: [*weighing_links(arm)], laws.link_weight, scale=_LOAD
+        "kg",
+        100.0,
+        lambda arm: [*find_distinguishable_weights(arm)],
+        laws.link_weight,
+        scale=_LOAD,
     ),
-    "declared_masses": Kind("1", 0.3, _nowhere, laws.heavier_than_declared),
+    "declared_masses": Kind("1", 0.3, _nowhere, laws.scale_declared_masses),
     "payload": Kind("kg", 25.0, _nowhere, laws.payload, scale=_LOAD),
     "compensator_torque": Kind("N/m", 1e5, _shoulder, laws.compensator_torque),
     "transmission_harmonic": Kind("rad", 8e-5, _joints(1), laws.transmission_harmonic),
@@ -86,7 +93,7 @@ KINDS: dict[str, Kind] = {
     "motor_eccentricity": Kind("rad", 6e-5, _joints(1), laws.motor_eccentricity),
     "transmission_order": Kind("rad", 8e-5, _joints(1), laws.transmission_order),
     "link_elasticity": Kind(
-        "1/(N m^2)", 1e-7, each_link, laws.link_elasticity, scale=_SOFT
+        "1/(N m^2)", 1e-7, list_flexible_links, laws.link_elasticity, scale=_SOFT
     ),
     "joint_tilt": Kind("rad/(N m)", 2e-7, _joints(1), laws.joint_tilt, scale=_SOFT),
     "base_compliance": Kind(
@@ -103,7 +110,7 @@ KINDS: dict[str, Kind] = {
         "1",
         0.1,
         _joints(1),
-        partial(laws.stiff_by_angle, lambda joint: joint),
+        partial(laws.modulate_stiffness, lambda joint: joint),
         largest=0.8,
     ),
     "compensator_stiffness": Kind("N/m", 3e6, _shoulder, laws.compensator_stiffness),
@@ -114,26 +121,34 @@ KINDS: dict[str, Kind] = {
     "lost_motion": Kind("rad", 7e-5, _joints(1), laws.lost_motion),
     "hysteresis": Kind("rad", 5e-5, _joints(1), laws.hysteresis, needs=("approach",)),
     "force_scale": Kind(
-        "1", 0.02, _nowhere, partial(laws.misread, "cell", "scale"), largest=0.1
+        "1",
+        0.02,
+        _nowhere,
+        partial(laws.set_instrument_error, "cell", "scale"),
+        largest=0.1,
     ),
     "force_misalignment": Kind(
-        "rad", 0.02, _nowhere, partial(laws.wrong_cell, "turn", "about_")
+        "rad", 0.02, _nowhere, partial(laws.add_load_cell_error, "turn", "about_")
     ),
     "force_bias": Kind(
-        "N", 20.0, _nowhere, partial(laws.wrong_cell, "bias", "along_"), scale=_LOAD
+        "N",
+        20.0,
+        _nowhere,
+        partial(laws.add_load_cell_error, "bias", "along_"),
+        scale=_LOAD,
     ),
     "application_point": Kind(
-        "m", 0.02, _nowhere, partial(laws.wrong_cell, "shift", "shift_")
+        "m", 0.02, _nowhere, partial(laws.add_load_cell_error, "shift", "shift_")
     ),
     "frame_drift": Kind("m/h", 1e-4, _nowhere, laws.frame_drift, needs=("time",)),
     "thermal_growth": Kind(
-        "1/K", 1.2e-5, _nowhere, laws.expanding, needs=("temperature",)
+        "1/K", 1.2e-5, _nowhere, laws.thermal_growth, needs=("temperature",)
     ),
     "setup_step": Kind("m", 1e-3, _nowhere, laws.setup_step),
     "temperature_gradient": Kind(
         "1/K",
         1.2e-5,
-        lambda arm: [(), *each_link(arm)],
+        lambda arm: [(), *list_flexible_links(arm)],
         laws.temperature_gradient,
         needs=("temperature",),
     ),
@@ -154,21 +169,28 @@ KINDS: dict[str, Kind] = {
         "1",
         0.15,
         lambda arm: [(2,), (3,)],
-        partial(laws.stiff_by_angle, lambda joint: 3 - joint),
+        partial(laws.modulate_stiffness, lambda joint: 3 - joint),
         largest=0.8,
     ),
     OUTSIDE + "stiffening_link": Kind(
-        "rad/(N m)^3", 1e-13, each_link, laws.stiffening_link, scale=(1.0, -2.0)
+        "rad/(N m)^3",
+        1e-13,
+        list_flexible_links,
+        laws.stiffening_link,
+        scale=(1.0, -2.0),
     ),
     OUTSIDE + "foot_slip": Kind("m", 8e-5, _nowhere, laws.foot_slip),
     OUTSIDE + "refraction": Kind(
-        "1/m", 2e-6, _nowhere, partial(laws.misread, "tracker", "refraction_per_m")
+        "1/m",
+        2e-6,
+        _nowhere,
+        partial(laws.set_instrument_error, "tracker", "refraction_per_m"),
     ),
     OUTSIDE + "cell_crosstalk": Kind(
         "1/N",
         5e-5,
         _nowhere,
-        partial(laws.misread, "cell", "crosstalk_per_N"),
+        partial(laws.set_instrument_error, "cell", "crosstalk_per_N"),
         scale=(0.0, -1.0),
     ),
     OUTSIDE + "short_waves": Kind("rad", 8e-5, _joints(1), laws.short_waves),
@@ -189,25 +211,27 @@ class Defect:
     size: float
     seed: int = 0
 
-    def on(self, robot: PhysicalRobot) -> laws.Applied:
+    def on(self, robot: SimulatedRobot) -> laws.DefectiveRobot:
         """The robot with it, and those of its parameters that are comparable."""
-        draws = stream(self.seed, f"details of {self.effect}")
+        draws = open_simulation_stream(self.seed, f"details of {self.effect}")
         return KINDS[self.effect].apply(
             robot, self.size, draws, *(joint - 1 for joint in self.joints)
         )
 
 
-def with_defects(
-    robot: PhysicalRobot, defects: Iterable[Defect], times: float = 1.0
-) -> PhysicalRobot:
+def apply_defects(
+    robot: SimulatedRobot, defects: Iterable[Defect], times: float = 1.0
+) -> SimulatedRobot:
     """A robot with defects, one after another, each so many times as large."""
     for defect in defects:
         robot = replace(defect, size=times * defect.size).on(robot)[0]
     return robot
 
 
-def drawn_defect(effect: str, arm: Arm, seed: int) -> Defect:
+def draw_defect(effect: str, arm: Arm, seed: int) -> Defect:
     """A defect of plausible size at a location that is drawn."""
     locations = KINDS[effect].locations(arm)
-    drawn = stream(seed, f"place of {effect}").integers(len(locations))
-    return Defect(effect, locations[drawn], KINDS[effect].plausible_on(arm), seed)
+    drawn = open_simulation_stream(seed, f"place of {effect}").integers(len(locations))
+    return Defect(
+        effect, locations[drawn], KINDS[effect].scale_plausible_size(arm), seed
+    )

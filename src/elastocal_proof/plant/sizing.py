@@ -1,14 +1,16 @@
-"""How large a defect is to the eye of a tracker: its non-centrality.
+"""Compute how visible a defect is to a tracker: its non-centrality.
 
-With d the change that a defect makes in the measurements, noise free, of the poses that
-are not held out, in standard deviations, the raw non-centrality is |d|^2. What the
-declared model cannot absorb by other compliances X of its joints (and, where the frame
-is unknown, by a motion of the frame) and by other weights V, in standard deviations of
-their declarations, is min over b, w of |d - X b - V w|^2 + |w|^2: the weights come in
-as prior information of mixed estimation [1] does.
+Let d be the noise-free change that a defect causes in the training measurements, in
+standard deviations. The raw non-centrality is |d|^2. The retained one is the part that
+the declared model cannot absorb by other joint compliances b (and, if the frame is
+unknown, by a motion of the frame) and by other weights w, in standard deviations of
+their declarations: min over b, w of |d - X b - V w|^2 + |w|^2. The weights enter as
+prior information, as in mixed estimation [1]_.
 
-[1] Theil, H. and Goldberger, A. S., On pure and mixed statistical estimation in economics, International Economic Review 2,
-    1961.
+References
+----------
+.. [1] Theil, H. and Goldberger, A. S., On pure and mixed statistical estimation in
+   economics, International Economic Review 2, 1961.
 """
 
 from __future__ import annotations
@@ -18,146 +20,171 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from elastocal_proof.plant.arm import LinkMass, rotation_vector
-from elastocal_proof.plant.machine import Machine
-from elastocal_proof.plant.physical_robot import (
-    PhysicalRobot,
+from elastocal_proof.plant.arm import LinkMass, to_rotation_vector
+from elastocal_proof.plant.multibody import MultibodyModel
+from elastocal_proof.plant.simulated_robot import (
     Schedule,
-    at_rest,
-    seen_poses,
-    stream,
+    SimulatedRobot,
+    open_simulation_stream,
+    simulate_equilibrium,
+    simulate_poses,
 )
 
-# Width of a link over the reach of the arm: within it centres of mass lie anywhere, as
-# far as an analyst knows.
+# Ratio of the width of a link to the reach of the arm. To the analyst's knowledge, a
+# centre of mass may lie anywhere within this width.
 _WIDTH_OF_REACH = 0.1
 
 
-class Yardstick:
-    """The faultless robot at a schedule, to which defective ones are compared.
+class NoncentralityModel:
+    """The faultless robot at a schedule, to which defective robots are compared.
 
-    `free_frame`: whether the analysis fits the tracker's frame. `declared`: weights as
-    they are declared to the analysis.
+    Parameters
+    ----------
+    robot, schedule
+        The faultless robot and its campaign.
+    free_frame
+        Whether the analysis fits the tracker's frame.
+    declared
+        Masses as they are declared to the analysis.
     """
 
     def __init__(
         self,
-        robot: PhysicalRobot,
+        robot: SimulatedRobot,
         schedule: Schedule,
+        *,
         free_frame: bool = False,
         declared: Sequence[LinkMass] = (),
     ) -> None:
         self.robot = robot
         self.schedule = schedule
-        machine, (coordinates, force, position, rotation) = at_rest(robot, schedule)
-        self._start = coordinates[:, machine.gear]
-        self.poses = robot.tracker.seen(
-            position, rotation, schedule.time_s, schedule.angle[:, -1]
+        model, rest = simulate_equilibrium(robot, schedule)
+        self._start = rest.coordinates[:, model.gear]
+        self.poses = robot.tracker.observe(
+            rest.position, rest.rotation, schedule.time_s, schedule.angle[:, -1]
         )
-        jacobian, torques = _responses(machine, coordinates, robot, declared)
-        springs = [
-            np.eye(robot.arm.joints)[joint] * force[:, machine.gear]
-            for joint in range(robot.arm.joints)
+        jacobian, torques = _linearize(model, rest.coordinates, robot, declared)
+        # Each compliance turns its own gear in proportion to the torque on it; each
+        # standard deviation of a weight turns all gears.
+        torque = rest.force[:, model.gear]
+        turns = [torque * unit for unit in np.eye(robot.arm.joints)]
+        turns += [robot.compliance * torque for torque in torques]
+        columns = [
+            self._whiten(np.einsum("stij,sj->sti", jacobian, turn)) for turn in turns
         ]
-        columns, weights = (
-            [self._flat(np.einsum("stij,sj->sti", jacobian, turn)) for turn in turns]
-            for turns in (springs, [robot.compliance * torque for torque in torques])
-        )
-        for axis in np.eye(3) if free_frame else ():
-            along = np.broadcast_to(axis, self.poses[0].shape)
-            nothing = np.zeros_like(self.poses[0])
-            columns.append(self._flat(np.concatenate([along, nothing], axis=-1)))
-            columns.append(
-                self._flat(
-                    np.concatenate([np.cross(axis, self.poses[0]), along], axis=-1)
-                )
-            )
-        height = len(columns[0])
-        # A column of nothing, such as the compliance of a joint that no load turns,
-        # absorbs nothing.
+        measurements = len(columns[0])
+        weights = columns[robot.arm.joints :]
+        columns = columns[: robot.arm.joints]
+        if free_frame:
+            columns += self._list_frame_motions()
+        # A column of zeros, such as the compliance of a joint without torque, absorbs
+        # nothing.
         columns = [
             column / np.linalg.norm(column) for column in columns if column.any()
         ]
         weights = [column for column in weights if column.any()]
-        stacked = np.zeros((height + len(weights), len(columns) + len(weights)))
-        stacked[:height] = np.array([*columns, *weights]).reshape(-1, height).T
-        stacked[height:, len(columns) :] = np.eye(len(weights))
-        self._absorbed = np.linalg.qr(stacked)[0]
+        # The lower rows state that each weight equals its declaration within one
+        # standard deviation.
+        priors = np.eye(len(weights), len(columns) + len(weights), len(columns))
+        design = np.array([*columns, *weights]).reshape(-1, measurements).T
+        self._absorbed = np.linalg.qr(np.vstack([design, priors]))[0]
         self._priors = len(weights)
 
-    def seen_and_left(self, robot: PhysicalRobot) -> tuple[np.ndarray, np.ndarray]:
-        """A robot's change in the measurements that are not held out, and what the
-        declared model cannot absorb of it, (M,).
+    def project_change(self, robot: SimulatedRobot) -> tuple[np.ndarray, np.ndarray]:
+        """Compute a robot's change in the training measurements and its residual.
 
-        Both in standard deviations; the last entries of the second are the weights, in
-        theirs, that absorb the rest.
+        Returns
+        -------
+        change : (M,) array
+            In standard deviations.
+        residual : (M + weights,) array
+            Part that the declared model cannot absorb; the last entries are the weights
+            that absorb the other part, in standard deviations of theirs.
         """
-        seen = self._change(*seen_poses(robot, self.schedule, self._start))
-        return seen, self._left(seen)
+        poses = simulate_poses(robot, self.schedule, self._start)
+        change = self._compute_change(*poses)
+        return change, self._compute_residual(change)
 
-    def residual(self, robot: PhysicalRobot) -> np.ndarray:
-        """What cannot be absorbed of a robot's measurements with the noise that they
-        have in its campaign."""
-        seen = seen_poses(robot, self.schedule, self._start)
-        draws = stream(self.schedule.seed, "readings")
-        return self._left(self._change(*robot.tracker.read(*seen, draws)))
+    def compute_measured_residual(self, robot: SimulatedRobot) -> np.ndarray:
+        """Compute the residual of a robot's measurements with the noise that they have
+        in its campaign."""
+        poses = simulate_poses(robot, self.schedule, self._start)
+        draws = open_simulation_stream(self.schedule.seed, "readings")
+        change = self._compute_change(*robot.tracker.read(*poses, draws))
+        return self._compute_residual(change)
 
-    def signal(self, robot: PhysicalRobot) -> dict[str, float]:
-        """Non-centralities of a robot's change before and after absorption, ``raw`` and
-        ``retained``."""
-        seen, left = self.seen_and_left(robot)
-        return {"raw": float(seen @ seen), "retained": float(left @ left)}
+    def compute_noncentralities(self, robot: SimulatedRobot) -> dict[str, float]:
+        """Compute the non-centralities of a robot's change before and after absorption,
+        ``raw`` and ``retained``."""
+        change, residual = self.project_change(robot)
+        return {"raw": float(change @ change), "retained": float(residual @ residual)}
 
-    def _change(self, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-        turns = rotation_vector(rotation @ np.swapaxes(self.poses[1], -1, -2))
-        return self._flat(np.concatenate([position - self.poses[0], turns], axis=-1))
+    def _list_frame_motions(self) -> list[np.ndarray]:
+        """Changes of the measurements by a shift along and a turn about each axis."""
+        position = self.poses[0]
+        motions = []
+        for unit in np.eye(3):
+            axis = np.broadcast_to(unit, position.shape)
+            shift = np.concatenate([axis, np.zeros_like(position)], axis=-1)
+            turn = np.concatenate([np.cross(unit, position), axis], axis=-1)
+            motions += [self._whiten(shift), self._whiten(turn)]
+        return motions
 
-    def _flat(self, apart: np.ndarray) -> np.ndarray:
-        """Changes (S, targets, 6) as the analysis counts them: in standard deviations,
-        of the poses that are not held out."""
+    def _compute_change(self, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+        turns = to_rotation_vector(rotation @ np.swapaxes(self.poses[1], -1, -2))
+        return self._whiten(np.concatenate([position - self.poses[0], turns], axis=-1))
+
+    def _whiten(self, change: np.ndarray) -> np.ndarray:
+        """Changes (S, targets, 6) of the training poses in standard deviations, (M,)."""
         tracker = self.robot.tracker
-        metres = apart[..., :3] / tracker.sigma_at(self.poses[0])[..., None]
-        counted = np.concatenate([metres, apart[..., 3:] / tracker.sigma_rad], axis=-1)
-        return counted[self.schedule.training].ravel()
+        shift = change[..., :3] / tracker.sigma_at(self.poses[0])[..., None]
+        whitened = np.concatenate([shift, change[..., 3:] / tracker.sigma_rad], axis=-1)
+        return whitened[self.schedule.training].ravel()
 
-    def _left(self, seen: np.ndarray) -> np.ndarray:
-        whole = np.append(seen, np.zeros(self._priors))
-        return whole - self._absorbed @ (self._absorbed.T @ whole)
+    def _compute_residual(self, change: np.ndarray) -> np.ndarray:
+        padded = np.append(change, np.zeros(self._priors))
+        return padded - self._absorbed @ (self._absorbed.T @ padded)
 
 
-def _responses(
-    machine: Machine,
+def _linearize(
+    model: MultibodyModel,
     coordinates: np.ndarray,
-    robot: PhysicalRobot,
+    robot: SimulatedRobot,
     declared: Sequence[LinkMass],
 ) -> tuple[np.ndarray, list[np.ndarray]]:
-    """To first order, at rest: Jacobians of all measuring points for turns of the
-    gears, (S, points, 6, n); and torques on the gears per standard deviation of each
-    mass and of each component of its centre, (S, n) each."""
-    model, data, gear = machine.model, mujoco.MjData(machine.model), machine.gear
-    shift = np.empty((3, model.nv))
-    turn = np.empty((3, model.nv))
-    count = len(coordinates)
-    jacobian = np.empty((count, len(machine.sites), 6, len(gear)))
-    torques = np.empty((len(declared), 4, count, len(gear)))
+    """Linearize the poses and the gravity torques of an arm at rest.
+
+    Returns
+    -------
+    jacobian : (S, points, 6, n) array
+        Of all measuring points with respect to the gears.
+    torques : list of (S, n) arrays
+        On the gears, per standard deviation of each mass and of each component of its
+        centre.
+    """
+    mujoco_model = model.model
+    data = mujoco.MjData(mujoco_model)
+    gear = model.gear
+    translation = np.empty((3, mujoco_model.nv))
+    rotation = np.empty((3, mujoco_model.nv))
+    min_distance_m = _WIDTH_OF_REACH * robot.arm.reach_m
+    jacobian = np.empty((len(coordinates), len(model.sites), 6, len(gear)))
+    torques = np.empty((len(declared), 4, len(coordinates), len(gear)))
     for state, row in enumerate(coordinates):
         data.qpos[:] = row
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        for point, site in enumerate(machine.sites):
-            mujoco.mj_jacSite(model, data, shift, turn, site)
-            jacobian[state, point, :3] = shift[:, gear]
-            jacobian[state, point, 3:] = turn[:, gear]
-        for number, mass in enumerate(declared):
-            link = model.body(f"arm{mass.link}" if mass.link else "foot").id
-            weight = mass.mass_kg * np.array(model.opt.gravity)
-            axes = data.xmat[link].reshape(3, 3)
-            mujoco.mj_jac(
-                model, data, shift, turn, data.xpos[link] + axes @ mass.centre_m, link
-            )
-            torques[number, 0, state] = mass.relative_std * (weight @ shift[:, gear])
-            moments = np.cross(axes.T, weight) * mass.centre_std_m(
-                _WIDTH_OF_REACH * robot.arm.reach_m
-            )
-            torques[number, 1:, state] = moments @ turn[:, gear]
-    return jacobian, [*torques.reshape(-1, count, len(gear))]
+        mujoco.mj_kinematics(mujoco_model, data)
+        mujoco.mj_comPos(mujoco_model, data)
+        for point, site in enumerate(model.sites):
+            mujoco.mj_jacSite(mujoco_model, data, translation, rotation, site)
+            jacobian[state, point, :3] = translation[:, gear]
+            jacobian[state, point, 3:] = rotation[:, gear]
+        for torque, mass in zip(torques[:, :, state], declared, strict=True):
+            body = mujoco_model.body(f"arm{mass.link}" if mass.link else "foot").id
+            axes = data.xmat[body].reshape(3, 3)
+            centre = data.xpos[body] + axes @ mass.centre_m
+            mujoco.mj_jac(mujoco_model, data, translation, rotation, centre, body)
+            weight = mass.mass_kg * np.array(mujoco_model.opt.gravity)
+            torque[0] = mass.relative_std * (weight @ translation[:, gear])
+            moments = np.cross(axes.T, weight) * mass.centre_std_m(min_distance_m)
+            torque[1:] = moments @ rotation[:, gear]
+    return jacobian, [*torques.reshape(-1, len(coordinates), len(gear))]

@@ -11,7 +11,7 @@ import pandas as pd
 from elastocal.counting import format_count, format_integer
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.documents import read_document
-from elastocal.report.words import plain
+from elastocal.report.words import format_number
 from elastocal_proof.blind.cases import PROOF, Plan
 from elastocal_proof.blind.summary import (
     BY_THE_BEST,
@@ -20,13 +20,13 @@ from elastocal_proof.blind.summary import (
     select_targets,
     summarize_by_robot,
 )
-from elastocal_proof.league.table import markdown
+from elastocal_proof.league.table import format_table
 
 _ABSENT = "–"
 _OUTCOMES = {"True": "reached", "False": "missed"}
 
 
-def targets_page(
+def format_targets_page(
     plan: Plan,
     summary: pd.DataFrame,
     of_each: Mapping[str, pd.DataFrame],
@@ -40,13 +40,13 @@ def targets_page(
 Written by `snakemake -j2 blind_pictures --config blind={size} seed={seed}`; [what it means](blind_proof.md). "At 50" is at a
 non-centrality of 50. Brackets hold 95 % intervals: of shares Clopper–Pearson, of the others a bootstrap over cases.
 
-{reached_words(summary)}
+{describe_reached_targets(summary)}
 
-{markdown(target_rows(plan, summary, of_each))}
+{format_table(tabulate_targets(plan, summary, of_each))}
 """
 
 
-def reached_words(summary: pd.DataFrame) -> str:
+def describe_reached_targets(summary: pd.DataFrame) -> str:
     """How many targets are reached."""
     judged = select_targets(summary).dropna(subset="holds")
     held = int((judged.holds.astype(str) == "True").sum())
@@ -59,7 +59,7 @@ def reached_words(summary: pd.DataFrame) -> str:
     return f"{held} of {format_count(len(judged), 'figure')} with a target reach it on {where}."
 
 
-def target_rows(
+def tabulate_targets(
     plan: Plan, summary: pd.DataFrame, of_each: Mapping[str, pd.DataFrame]
 ) -> list[dict[str, str]]:
     """Each quantity with a target as a row of words, beside what every robot has alone
@@ -100,14 +100,16 @@ def _with_interval(row: Any) -> str:
     if pd.isna(row.low):
         return f"{_value(row)} ({_ABSENT})"
     if _is_ratio(row):
-        return f"{_value(row)} ({plain(row.low, 4)}–{plain(row.high, 4)})"
+        return (
+            f"{_value(row)} ({format_number(row.low, 4)}–{format_number(row.high, 4)})"
+        )
     return f"{_value(row)} ({100 * row.low:.1f}–{100 * row.high:.1f} %)"
 
 
 def _value(row: Any) -> str:
     if pd.isna(row.rate):
         return _ABSENT
-    return plain(row.rate, 4) if _is_ratio(row) else f"{100 * row.rate:.1f} %"
+    return format_number(row.rate, 4) if _is_ratio(row) else f"{100 * row.rate:.1f} %"
 
 
 def _is_ratio(row: Any) -> bool:
@@ -135,5 +137,5 @@ def write_blind_page(job: Any) -> None:
     }
     write_text(
         job.output.page,
-        targets_page(asked.plan, summary, alone, asked.size, asked.seed),
+        format_targets_page(asked.plan, summary, alone, asked.size, asked.seed),
     )

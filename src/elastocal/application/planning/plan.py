@@ -227,8 +227,8 @@ def order_by_motion(joint_angles: np.ndarray, chosen: list[int]) -> list[int]:
 
     References
     ----------
-    [1] Croes, G. A., A method for solving traveling-salesman problems, Operations
-    Research 6, 1958.
+    .. [1] Croes, G. A., A method for solving traveling-salesman problems, Operations
+       Research 6, 1958.
     """
     if len(chosen) < 3:
         return list(chosen)

@@ -19,11 +19,12 @@ from elastocal.mechanics.kinematics import (
     compute_poses_and_jacobians,
 )
 from elastocal_proof.plant.arm import LinkMass
-from elastocal_proof.plant.machine import (
+from elastocal_proof.plant.multibody import (
+    EquilibriumProblem,
     Structure,
     TaperedTube,
-    equilibrium,
-    machine_of,
+    build_model,
+    solve_equilibrium,
 )
 
 # One joint about y, its link forwards along x, and a measuring point at its end.
@@ -85,17 +86,17 @@ def test_weight_turns_the_joints_as_pinocchio_says(arm):
     gravity = (3.0, -2.0, -9.0)
     angles, _ = angles_and_wrenches(arm)
     found = forces_at(
-        machine_of(arm, Structure(masses=masses, payload=load, gravity_m_s2=gravity)),
+        build_model(arm, Structure(masses=masses, payload=load, gravity_m_s2=gravity)),
         angles,
     )[0]
     model = pin.Model()
     parent = 0
     for number, axis in enumerate(arm.axes):
-        place = pin.SE3(arm.stretches[number].rotation, arm.stretches[number].vector_m)
+        place = pin.SE3(arm.links[number].rotation, arm.links[number].vector_m)
         parent = model.addJoint(
             parent, pin.JointModelRevoluteUnaligned(axis), place, f"q{number}"
         )
-        stretch = arm.stretches[number + 1]
+        stretch = arm.links[number + 1]
         weights = [
             (m.mass_kg, np.array(m.centre_m)) for m in masses if m.link == number + 1
         ]
@@ -149,22 +150,25 @@ def test_an_arm_with_everything_is_in_equilibrium_by_mujocos_inverse_dynamics(ar
 
 def test_an_arm_that_finds_no_rest_is_an_error():
     signs = cycle([0.01, -0.01])
-    loading = (np.zeros((1, 1)), lambda facing: np.zeros((1, 6)), np.zeros((1, 2)))
+    problem = EquilibriumProblem(
+        drive=np.zeros((1, 1)),
+        growth=np.zeros((1, 2)),
+        applied_wrench=lambda rotation: np.zeros((1, 6)),
+        gear_deflection=lambda torque, unloaded: 0 * torque + next(signs),
+    )
     with pytest.raises(
         RuntimeError, match=r"^no equilibrium after 60 sweeps: the last moved by 0\.02$"
     ):
-        equilibrium(
-            machine_of(LEVER, Structure()),
-            *loading,
-            lambda torque, _: 0 * torque + next(signs),
-        )
+        solve_equilibrium(build_model(LEVER, Structure()), problem)
 
 
 def test_a_point_inside_a_link_of_wrong_length_keeps_its_place_and_none_may_be_inside_an_elastic_one():
     arm = arm_of("Rz(q1) Tx(0.4) [inner] Tx(0.6) Ry(q2) Tx(0.5) [B]")
-    machine = machine_of(arm, Structure(wrong={1: ((0.0, 0.02, 0.0), (0.0, 0.0, 0.1))}))
+    machine = build_model(
+        arm, Structure(geometry_errors={1: ((0.0, 0.02, 0.0), (0.0, 0.0, 0.1))})
+    )
     np.testing.assert_allclose(
         forces_at(machine, np.zeros((1, 2)))[1][0, 0], [0.4, 0.0, 0.0], atol=1e-14
     )
     with pytest.raises(InputError, match="inner"):
-        machine_of(arm, Structure(tubes={1: TaperedTube(1e6, 1e6)}))
+        build_model(arm, Structure(tubes={1: TaperedTube(1e6, 1e6)}))
