@@ -29,9 +29,9 @@ _METADATA = "its own metadata"
 OF_EVERY_FILE = ("its record", _SHA, _METADATA)
 # Checks that compute a file again, by the pattern of its name. Names in braces are
 # arguments of the check.
-CHECKS: tuple[tuple[str, _Check], ...] = tuple(
-    (study.CHECKS | campaigns.CHECKS | fits.CHECKS).items()
-)
+CHECKS: list[tuple[str, _Check]] = [
+    item for module in (study, campaigns, fits) for item in module.CHECKS.items()
+]
 COLUMNS = ("file", "checked", "by", "compared", "worst", "holds", "note")
 # Findings that the page shows in full.
 _MOST_SHOWN = 200

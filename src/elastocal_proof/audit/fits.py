@@ -69,14 +69,14 @@ class FittedModel:
     Attributes
     ----------
     kind : kind of the step of the diagnosis
-    parameters : rows of steps.parquet
+    parameter_rows : rows of steps.parquet
     noise : standard deviations of the measurements
     springs : (C, C) array, compliance of all coordinates
     derivatives : (P, C, C) array, of `springs` with respect to each parameter
     """
 
     kind: str
-    parameters: pd.DataFrame
+    parameter_rows: pd.DataFrame
     noise: Mapping[str, Any]
     springs: np.ndarray
     derivatives: np.ndarray
@@ -286,14 +286,14 @@ def take_least_squares_step(
         rows, model.noise, averages, jacobian[:, :, : campaign.arm.joints]
     )
     value, prior_std, error = (
-        model.list_parameters[name].to_numpy()
+        model.parameter_rows[name].to_numpy()
         for name in ("value", "prior_std", "std_error")
     )
     prior_rows = np.column_stack([np.eye(len(value)), -value]) / prior_std[:, None]
     rows = np.concatenate([rows, prior_rows[np.isfinite(prior_std)]])
-    free = ~model.list_parameters["held"].to_numpy(bool)
+    free = ~model.parameter_rows["held"].to_numpy(bool)
     # A taper at one of its bounds stays there.
-    is_taper = (model.list_parameters["parameter"] == "taper").to_numpy()
+    is_taper = (model.parameter_rows["parameter"] == "taper").to_numpy()
     movable = free & ~(is_taper & np.isin(value, [0.0, _LARGEST_TAPER]))
     fit, step = (
         sm.OLS(rows[:, -1], rows[:, :-1][:, columns]).fit(
@@ -375,7 +375,7 @@ def check_fits(run: FinishedRun, file: str, campaign: str) -> Iterator[Finding]:
     ]
     rejected = training["row"].isin(gross_errors) | _find_outliers(training)
     for number, model in enumerate(audited.models):
-        if model is None or model.list_parameters["held"].all():
+        if model is None or model.parameter_rows["held"].all():
             continue
         fit, moves = take_least_squares_step(audited, model, training[~rejected])
         step = f"of step {number} ({model.kind})"
@@ -386,8 +386,8 @@ def check_fits(run: FinishedRun, file: str, campaign: str) -> Iterator[Finding]:
             0 * moves,
             absolute=SETTLED,
         )
-        free = ~model.list_parameters["held"].to_numpy(bool)
-        ratios = model.list_parameters["std_error"][free] / fit.bse
+        free = ~model.parameter_rows["held"].to_numpy(bool)
+        ratios = model.parameter_rows["std_error"][free] / fit.bse
         yield compare(
             f"standard errors {step}",
             _BY,
@@ -520,7 +520,7 @@ def _predict_positions(
     equilibrium = passes[:, -1]
     tolerance = np.abs(equilibrium - passes[:, _PACKAGE_PASSES - 1]).max()
     tolerance += _POSITION_TOLERANCE_M
-    errors = model.list_parameters["std_error"].fillna(0.0).to_numpy()[:, None, None]
+    errors = model.parameter_rows["std_error"].fillna(0.0).to_numpy()[:, None, None]
     moves = SETTLED * max(scatter_m / model.noise["position_m"], 1.0) * errors
     for change in moves * model.derivatives:
         tolerance += np.abs(iterate(model.springs + change)[:, -1] - equilibrium).max()

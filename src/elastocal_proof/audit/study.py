@@ -63,21 +63,19 @@ def _draw_experiments(
     "identification" or "test"."""
     settings = run.configuration
     arm = run.arm(robot)
-    limits = np.array([-np.pi, np.pi])
+    low, high = -np.pi, np.pi
     if settings["interpretations"]["joint_range"] == "limits":
-        limits = np.deg2rad(run.robots[robot]["joint_limits_deg"])
+        low, high = np.deg2rad(run.robots[robot]["joint_limits_deg"]).T
     stream = open_philox_stream(run.seed, robot, f"{use}/joint angles", data_set)
-    angles = limits[..., 0] + np.diff(limits)[..., 0] * stream.random(
-        (count, arm.joints)
-    )
+    angles = low + (high - low) * stream.random((count, arm.joints))
     stream = open_philox_stream(run.seed, robot, f"{use}/force", data_set)
-    normal = stream.standard_normal((count, 3))
-    force = settings["loading"]["force_N"] * normal
-    force /= np.linalg.norm(normal, axis=1)[:, None]
+    force = stream.standard_normal((count, 3))
+    force /= np.linalg.norm(force, axis=1)[:, None]
+    force *= settings["loading"]["force_N"]
     lever = np.array(settings["loading"]["offset_m"], float)
     if settings["interpretations"]["offset_frame"] == "tool":
-        poses = [arm.pose(arm.extend(q), arm.points[-1]) for q in angles]
-        lever = np.array([rotation @ lever for _, rotation in poses])
+        end = arm.points[-1]
+        lever = np.array([arm.pose(arm.extend(q), end)[1] @ lever for q in angles])
     return angles, np.concatenate([force, np.cross(lever, force)], axis=1)
 
 
@@ -109,8 +107,9 @@ def check_ideal_deflections(
                 arm.springs, angles[index], wrenches[index], 1, *run.at(point)
             )
             position, rotation = arm.pose(coordinates, point)
-            turned = pin.log3(rotation @ rotation_0.T)
-            expected.append(np.concatenate([position - position_0, turned]))
+            expected.append(
+                [*(position - position_0), *pin.log3(rotation @ rotation_0.T)]
+            )
         yield compare(
             f"deflection of {point}, {len(rows)} rows",
             "pinocchio",
