@@ -1,11 +1,11 @@
-"""What proves the tool: no user needs it but for `elastocal demo`, whose robot is one
-of `plant`.
+"""Proofs that the tool works; users need none of them except `elastocal demo`, whose
+robot is one of `plant`.
 
-Rooms, from the ground up; they import what they like of `elastocal`, but for `plant`,
-which takes its errors alone:
+Packages from the lowest layer upwards. They import any part of `elastocal`, except
+`plant`, which takes only its errors:
 
-    plant                                 a physical robot with hidden defects
-    blind, league                         the blind proof and the closed loop on that robot; methods on public data
-    audit                                 samples of every file worked out again by other libraries
-    figures, report                       what people see of these
+    plant                                 simulated physical robots with hidden defects
+    blind, league                         blind benchmark and closed loop on these robots; methods on public data
+    audit                                 samples of every file, computed again by other libraries
+    figures, report                       figures and pages for readers
 """

@@ -1,4 +1,4 @@
-"""The list of cases, and the making of one."""
+"""The list of blind cases, and the making of one case."""
 
 import hashlib
 import json
@@ -16,7 +16,7 @@ from elastocal_proof.blind.cases import (
     OUTSIDE_EFFECTS,
     PROOF,
     BlindCase,
-    build_yardstick,
+    build_noncentrality_model,
     list_cases,
     size_defects,
     write_sealed_case,
@@ -24,19 +24,19 @@ from elastocal_proof.blind.cases import (
 from elastocal_proof.plant.kinds import KINDS
 
 SETTINGS = PLAN["settings"]
-# Of names and seeds of the quick cases of seed 1, with declared masses among the
-# effects.
-NAMES = "2337bc6da1e6"
+# Digest of the names and seeds of the quick cases of seed 1, whose effects include
+# declared masses.
+NAMES_DIGEST = "2337bc6da1e6"
 
 
-def a_case(
+def make_case(
     effects=(),
     levels=(),
     setting="usual",
     robot="fanuc",
     seed=5,
     group="single",
-    **more,
+    **fields,
 ):
     return BlindCase(
         "/".join([*effects, setting]),
@@ -47,158 +47,166 @@ def a_case(
         setting,
         seed,
         changes=SETTINGS[setting],
-        **more,
+        **fields,
     )
 
 
-def made(case, folder):
-    """Campaign and truth of a case."""
+def write_and_read(case, folder):
+    """Write a case, and return its campaign and its ground truth."""
     digest = write_sealed_case(case, folder / "blind", folder / "sealed", ROBOTS)
-    text = (folder / "sealed" / f"{case.name}.json").read_bytes()
-    assert hashlib.sha256(text).hexdigest() == digest
-    files = read_campaign_folder(folder / "blind" / case.name, ROBOTS)
-    return read_campaign(files), json.loads(text)
+    sealed = (folder / "sealed" / f"{case.name}.json").read_bytes()
+    assert hashlib.sha256(sealed).hexdigest() == digest
+    campaign_folder = read_campaign_folder(folder / "blind" / case.name, ROBOTS)
+    return read_campaign(campaign_folder), json.loads(sealed)
 
 
-def sized(case):
-    robot = case.specimen(ROBOTS)
-    return robot, size_defects(case, robot, build_yardstick(case, robot))
-
-
-def test_the_full_size_has_the_nulls_effects_levels_and_robots_that_the_protocol_asks_for():
-    cases = list_cases(PLAN, "full", 1)
-    proof = [case for case in cases if case.robots == PROOF]
-    assert {case.robot for case in proof} == {"gen3", "irb7600"} and len(proof) == len(
-        cases
-    ) <= 2000
-    assert sum(case.group == "none" for case in proof) == 520
-    for setting in (name for name, changes in SETTINGS.items() if changes.get("hard")):
-        assert sum(not case.effects and case.setting == setting for case in proof) == 50
-    for effect in CATALOGUE_EFFECTS:
-        # An arm without a gravity compensator has none that is wrong.
-        for level in (25.0, 50.0, 200.0):
-            found = sum(
-                c.group == "single" and c.effects == (effect,) and c.levels == (level,)
-                for c in proof
-            )
-            assert found == (2 if effect.startswith("compensator") else 4)
-    for effect in OUTSIDE_EFFECTS:
-        assert (
-            sum(
-                c.group == "outside" and c.effects == (effect,) and c.levels == (200.0,)
-                for c in proof
-            )
-            == 10
-        )
-    for level in (50.0, 200.0):
-        assert (
-            sum(c.group == "pair" and c.levels == (level, level) for c in proof) == 60
-        )
-    for group, count in (("several_joints", 52), ("gear_gravity", 64), ("remains", 40)):
-        assert sum(c.group == group for c in proof) == count
-    assert {case.setting for case in cases} == set(SETTINGS)
-    assert len({case.name for case in cases}) == len(cases)
-
-
-def test_only_the_full_size_shows_the_proofs_robots_and_names_and_seeds_follow_from_seed_and_key_alone():
-    sizes = {
-        size: list_cases(PLAN, size, 1)
-        for size in ("smoke", "quick", "development", "full")
-    }
-    assert {
-        case.robots for size, some in sizes.items() if size != "full" for case in some
-    } == {"tuned"}
-    # Cases to develop on are in no other.
-    developed = {case.seed for case in sizes["development"]}
-    cases = sizes["quick"]
-    assert not developed & {case.seed for case in (*cases, *sizes["full"])}
-    assert (
-        cases
-        == list_cases(PLAN, "quick", 1)
-        == sorted(cases, key=lambda case: case.name)
+def draw_sized_defects(case):
+    return size_defects(
+        case, build_noncentrality_model(case, case.build_specimen(ROBOTS))
     )
-    # Pinned: sealed documents of earlier runs hold what follows from these.
-    of_old = [
+
+
+@pytest.fixture(scope="module")
+def full_size():
+    return list_cases(PLAN, "full", 1)
+
+
+def test_the_full_size_has_the_robots_null_cases_and_settings_of_the_protocol(
+    full_size,
+):
+    assert {case.robots for case in full_size} == {PROOF}
+    assert {case.robot for case in full_size} == {"gen3", "irb7600"}
+    assert len(full_size) <= 2000
+    assert sum(case.group == "none" for case in full_size) == 520
+    for setting, changes in SETTINGS.items():
+        if changes.get("hard"):
+            null_cases = [
+                case
+                for case in full_size
+                if case.setting == setting and not case.effects
+            ]
+            assert len(null_cases) == 50
+    assert {case.setting for case in full_size} == set(SETTINGS)
+    assert len({case.name for case in full_size}) == len(full_size)
+
+
+def test_the_full_size_has_the_effects_and_levels_of_the_protocol(full_size):
+    def count(group, **fields):
+        return sum(
+            case.group == group
+            and all(getattr(case, name) == value for name, value in fields.items())
+            for case in full_size
+        )
+
+    for effect in CATALOGUE_EFFECTS:
+        # One of the two robots has no gravity compensator, so no wrong one either.
+        expected = 2 if effect.startswith("compensator") else 4
+        for level in (25.0, 50.0, 200.0):
+            assert count("single", effects=(effect,), levels=(level,)) == expected
+    for effect in OUTSIDE_EFFECTS:
+        assert count("outside", effects=(effect,), levels=(200.0,)) == 10
+    for level in (50.0, 200.0):
+        assert count("pair", levels=(level, level)) == 60
+    assert count("several_joints") == 52
+    assert count("gear_gravity") == 64
+    assert count("remains") == 40
+
+
+def test_only_the_full_size_contains_robots_of_the_proof():
+    for size in ("smoke", "quick", "development"):
+        assert {case.robots for case in list_cases(PLAN, size, 1)} == {"tuned"}
+
+
+def test_cases_to_develop_on_are_in_no_other_size(full_size):
+    developed = {case.seed for case in list_cases(PLAN, "development", 1)}
+    evaluated = [*list_cases(PLAN, "quick", 1), *full_size]
+    assert not developed & {case.seed for case in evaluated}
+
+
+def test_names_and_seeds_follow_from_the_seed_and_the_key_alone():
+    cases = list_cases(PLAN, "quick", 1)
+    assert cases == list_cases(PLAN, "quick", 1)
+    assert cases == sorted(cases, key=lambda case: case.name)
+    # The sealed documents of earlier runs depend on these names and seeds.
+    earlier_cases = [
         case
         for case in cases
         if case.setting != "many_poses" and "two_angles" not in case.key
     ]
-    digest = hashlib.sha256(
-        " ".join(f"{case.name} {case.seed}" for case in of_old).encode()
-    ).hexdigest()
-    assert digest[:12] == NAMES
-    assert not {case.name for case in cases} & {
-        case.name for case in list_cases(PLAN, "quick", 2)
-    }
+    names_and_seeds = " ".join(f"{case.name} {case.seed}" for case in earlier_cases)
+    digest = hashlib.sha256(names_and_seeds.encode()).hexdigest()
+    assert digest[:12] == NAMES_DIGEST
+    names_of_another_seed = {case.name for case in list_cases(PLAN, "quick", 2)}
+    assert not names_of_another_seed & {case.name for case in cases}
 
 
-def test_a_case_has_its_effect_at_its_non_centrality_or_is_told_to_be_absorbed_at_the_largest_that_means_anything():
-    _, ((_, sizing),) = sized(a_case(("lost_motion",), (50.0,)))
-    assert sizing["of"] == "retained" and sizing["signal"]["retained"] == pytest.approx(
-        50.0, rel=0.011
-    )
+def test_a_defect_has_the_non_centrality_of_its_case():
+    [(_, sizing)] = draw_sized_defects(make_case(("lost_motion",), (50.0,)))
+    assert sizing["of"] == "retained"
+    assert sizing["signal"]["retained"] == pytest.approx(50.0, rel=0.011)
     assert sizing["signal"]["raw"] > sizing["signal"]["retained"]
-    # The force of a load cell that is off by a tenth shows less than a non-centrality
-    # of 10,000.
-    _, ((_, sizing),) = sized(a_case(("force_scale",), (50.0,)))
-    assert sizing["of"] == "raw" and sizing["signal"]["retained"] < 0.1
-    _, ((defect, sizing),) = sized(a_case(("force_scale",), (1e4,)))
-    assert (defect.size, sizing["of"]) == (KINDS["force_scale"].largest, "raw")
+
+
+def test_a_defect_that_the_model_absorbs_is_sized_by_its_raw_non_centrality():
+    [(_, sizing)] = draw_sized_defects(make_case(("force_scale",), (50.0,)))
+    assert sizing["of"] == "raw"
+    assert sizing["signal"]["retained"] < 0.1
+
+
+def test_a_defect_that_is_too_small_at_its_largest_size_has_that_size():
+    # A load cell that is wrong by a tenth has a non-centrality below 10,000.
+    [(defect, sizing)] = draw_sized_defects(make_case(("force_scale",), (1e4,)))
+    assert defect.size == KINDS["force_scale"].largest
+    assert sizing["of"] == "raw"
     assert 10.0 < sizing["signal"]["raw"] < 1e4
 
 
 @pytest.mark.parametrize("setting", sorted(SETTINGS))
 def test_each_setting_makes_a_campaign_that_can_be_read(tmp_path, setting):
-    case = a_case(setting=setting)
-    campaign, truth = made(case, tmp_path)
-    assert (
-        truth["case"]["setting"] == setting
-        and truth["case"]["changes"] == SETTINGS[setting]
-        and not truth["defects"]
-    )
+    case = make_case(setting=setting)
+    campaign, truth = write_and_read(case, tmp_path)
+    assert truth["case"]["setting"] == setting
+    assert truth["case"]["changes"] == SETTINGS[setting]
+    assert not truth["defects"]
     for covariate, column in (
         ("approach", "approach"),
         ("time", "time_s"),
         ("temperature", "temperature_c"),
     ):
-        assert (getattr(campaign.measurements, column) is not None) == (
-            covariate in case.design.covariates
-        )
+        is_present = getattr(campaign.measurements, column) is not None
+        assert is_present == (covariate in case.design.covariates)
     if setting.startswith("declared"):
-        assert campaign.noise["position_m"] == pytest.approx(
-            SETTINGS[setting]["declared_ratio"] * 60e-6
-        )
+        ratio = SETTINGS[setting]["declared_ratio"]
+        assert campaign.noise["position_m"] == pytest.approx(ratio * 60e-6)
         assert campaign.measurements.repeat.max() == 0
     assert campaign.frame == ("tracker" if setting == "unknown_frame" else "base")
     assert bool(campaign.robot.masses) == (setting != "weight_compensated")
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_groups_put_their_defects_where_they_belong(seed):
-    _, ((defect, _),) = sized(
-        a_case(("stiffening",), (200.0,), seed=seed, group="gear_gravity")
+def test_each_group_has_its_defects_at_the_right_joints(seed):
+    [(gear_defect, _)] = draw_sized_defects(
+        make_case(("stiffening",), (200.0,), seed=seed, group="gear_gravity")
     )
-    assert defect.joints in ((2,), (3,))
-    _, several = sized(
-        a_case(("joint_offset",), (200.0,), seed=seed, group="several_joints")
+    assert gear_defect.joints in ((2,), (3,))
+    offsets = draw_sized_defects(
+        make_case(("joint_offset",), (200.0,), seed=seed, group="several_joints")
     )
-    assert 3 <= len({defect.joints for defect, _ in several}) == len(several) <= 6
-    _, ((everything, _),) = sized(
-        a_case(("link_weight",), (1e6,), seed=seed, group="undeclared")
+    joints = {defect.joints for defect, _ in offsets}
+    assert 3 <= len(joints) == len(offsets) <= 6
+    [(undeclared_weight, _)] = draw_sized_defects(
+        make_case(("link_weight",), (1e6,), seed=seed, group="undeclared")
     )
-    assert everything.joints == (2, 3, 4, 5)
+    assert undeclared_weight.joints == (2, 3, 4, 5)
 
 
-def test_a_case_is_made_the_same_again_and_nothing_of_its_truth_lies_in_the_blind_folder(
-    tmp_path,
-):
-    case = replace(a_case(("thermal_growth",), (25.0,), robot="abb"), seed=187654321)
+def test_a_case_is_reproducible_and_its_blind_folder_reveals_nothing(tmp_path):
+    case = replace(make_case(("thermal_growth",), (25.0,), robot="abb"), seed=187654321)
     for folder in ("one", "two"):
-        made(case, tmp_path / folder)
+        write_and_read(case, tmp_path / folder)
     for path in (f"blind/{case.name}/measurements.parquet", f"sealed/{case.name}.json"):
-        assert (tmp_path / "one" / path).read_bytes() == (
-            tmp_path / "two" / path
-        ).read_bytes()
+        first = (tmp_path / "one" / path).read_bytes()
+        assert first == (tmp_path / "two" / path).read_bytes()
     files = [path for path in (tmp_path / "one" / "blind").rglob("*") if path.is_file()]
     assert sorted(path.name for path in files) == [
         "campaign.yaml",
@@ -206,44 +214,42 @@ def test_a_case_is_made_the_same_again_and_nothing_of_its_truth_lies_in_the_blin
         "robot.yaml",
     ]
     content = b"".join(path.read_bytes() for path in files)
-    for word in (
+    for secret in (
         b"thermal_growth",
         b"seed",
         b"usual",
         str(case.seed).encode(),
         tmp_path.name.encode(),
     ):
-        assert word not in content
+        assert secret not in content
 
 
-def test_bad_rows_are_planted_and_sealed_and_a_base_is_tilted_against_its_own_frame(
-    tmp_path,
-):
-    clean, _ = made(a_case(), tmp_path / "clean")
-    (bad, slipped), (tilted, moved) = (
-        made(a_case(setting=name), tmp_path / name)
-        for name in ("bad_rows", "tilted_base")
-    )
-    names = ("position", "rotation_vector", "wrench", "joint_angles")
-    apart = np.any(
+def test_bad_rows_are_planted_and_sealed(tmp_path):
+    clean, _ = write_and_read(make_case(), tmp_path / "clean")
+    damaged, truth = write_and_read(make_case(setting="bad_rows"), tmp_path / "bad")
+    differs = np.any(
         [
-            (getattr(bad.measurements, name) != getattr(clean.measurements, name)).any(
-                axis=1
-            )
-            for name in names
+            (
+                getattr(damaged.measurements, name) != getattr(clean.measurements, name)
+            ).any(axis=1)
+            for name in ("position", "rotation_vector", "wrench", "joint_angles")
         ],
         axis=0,
     )
-    assert set(np.flatnonzero(apart).tolist()) == {
-        row for slip in slipped["bad_rows"] for row in slip["rows"]
-    }
-    assert 1 <= len(slipped["bad_rows"]) <= 3 and "misplaced" not in slipped
-    off = np.linalg.norm(
+    sealed_rows = {row for slip in truth["bad_rows"] for row in slip["rows"]}
+    assert set(np.flatnonzero(differs).tolist()) == sealed_rows
+    assert 1 <= len(truth["bad_rows"]) <= 3
+    assert "misplaced" not in truth
+
+
+def test_a_tilted_base_moves_points_more_that_are_farther_from_it(tmp_path):
+    clean, _ = write_and_read(make_case(), tmp_path / "clean")
+    tilted, truth = write_and_read(
+        make_case(setting="tilted_base"), tmp_path / "tilted"
+    )
+    assert 1e-5 < np.linalg.norm(truth["misplaced"]["turn_rad"]) < 1.2e-3
+    assert "bad_rows" not in truth
+    displacement_m = np.linalg.norm(
         tilted.measurements.position - clean.measurements.position, axis=1
     )
-    assert (
-        1e-5 < np.linalg.norm(moved["misplaced"]["turn_rad"]) < 1.2e-3
-        and "bad_rows" not in moved
-    )
-    # A tilt moves what is far from the base more.
-    assert off.min() < off.max() < 2e-3
+    assert displacement_m.min() < displacement_m.max() < 2e-3

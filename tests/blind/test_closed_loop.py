@@ -1,5 +1,5 @@
-"""The loop closed on the plant, in small: what is wanted, what each model leaves, and
-what the plant itself makes the floor."""
+"""The closed loop in small: wanted poses, the errors of each model, and the floor that
+the simulated robot itself sets."""
 
 import numpy as np
 import pandas as pd
@@ -25,39 +25,47 @@ from elastocal_proof.blind.folders import write_blind_campaign
 
 
 @pytest.fixture
-def made(monkeypatch):
-    """The loop of one robot at few poses."""
+def run_small_loop(monkeypatch):
+    """Run the loop of one robot at few poses."""
     monkeypatch.setattr(module, "_POSES", 6)
     monkeypatch.setattr(module, "_PATH", 12)
-    return lambda **more: pd.DataFrame(
-        run_closed_loop(ROBOTS / "gp180.yaml", "compensator_torque", 768481013, **more)
-    )
+
+    def run(**options):
+        robot_file = ROBOTS / "gp180.yaml"
+        return pd.DataFrame(
+            run_closed_loop(robot_file, "compensator_torque", 768481013, **options)
+        )
+
+    return run
 
 
-def rms(table, model):
-    return np.sqrt((table.loc[table["model"] == model, "reached_error_m"] ** 2).mean())
+def compute_rms(table, model):
+    errors = table.loc[table["model"] == model, "reached_error_m"]
+    return np.sqrt((errors**2).mean())
 
 
 @pytest.mark.slow
-def test_every_pose_is_commanded_by_every_model_and_the_model_found_is_nearer_than_the_declared_one(
-    made,
+def test_every_model_commands_every_pose_and_the_diagnosed_one_beats_the_declared_one(
+    run_small_loop,
 ):
-    table = made()
+    table = run_small_loop()
     assert table.groupby(["part", "model"]).size().to_dict() == {
         (part, model): 12 if part == "milling" else 6
         for part in PARTS
         for model in MODELS
     }
     assert table.loc[table["model"].isin([DIAGNOSED, PLANT]), "corrected"].all()
-    assert rms(table, PLANT) < rms(table, DIAGNOSED) < rms(table, DECLARED)
-    assert rms(table, DECLARED) < min(rms(table, GEOMETRY), rms(table, UNCORRECTED))
+    rms = {model: compute_rms(table, model) for model in MODELS}
+    assert rms[PLANT] < rms[DIAGNOSED] < rms[DECLARED]
+    assert rms[DECLARED] < min(rms[GEOMETRY], rms[UNCORRECTED])
     assert table["named"].all()
 
 
 @pytest.mark.slow
 def test_every_hidden_effect_moves_the_robot_and_needs_no_covariate():
-    found = [effect for effect, _ in list_hidden_effects(ROBOTS / "iiwa14.yaml", 1, 2)]
-    assert found.count("lost_motion") == found.count("payload") == 2
+    cases = list_hidden_effects(ROBOTS / "iiwa14.yaml", 1, 2)
+    effects = [effect for effect, _ in cases]
+    assert effects.count("lost_motion") == effects.count("payload") == 2
     assert not {
         "tracker_scale",
         "force_bias",
@@ -65,82 +73,77 @@ def test_every_hidden_effect_moves_the_robot_and_needs_no_covariate():
         "hysteresis",
         "thermal_growth",
         "joint_offset",
-    } & set(found)
+    } & set(effects)
 
 
 @pytest.mark.slow
-def test_with_slips_the_floor_is_the_same_in_the_declared_base_and_the_campaign_has_a_lost_beam(
-    made, monkeypatch
+def test_with_slips_the_base_is_tilted_and_one_row_has_a_lost_beam(
+    run_small_loop, monkeypatch
 ):
-    written = []
-    monkeypatch.setattr(
-        module,
-        "write_blind_campaign",
-        lambda *a, **k: written.append(write_blind_campaign(*a, **k)),
-    )
-    slipped = made(slips=True)
-    assert 1e-6 < rms(slipped, PLANT) < 4e-5
-    # A tilt of 0.3 mrad and a shift that the uncorrected robot does not know of.
-    assert rms(slipped, UNCORRECTED) > 1e-3
-    ((slip,),) = [each["bad_rows"] for each in written]
-    assert slip["kind"] in ("zeros", "held_point") and len(slip["rows"]) == 1
+    records = []
+
+    def write_and_record(*arguments):
+        records.append(write_blind_campaign(*arguments))
+
+    monkeypatch.setattr(module, "write_blind_campaign", write_and_record)
+    table = run_small_loop(slips=True)
+    # In the declared base frame the floor is the same as without slips.
+    assert 1e-6 < compute_rms(table, PLANT) < 4e-5
+    # The uncorrected robot knows nothing of a tilt of 0.3 mrad and a shift.
+    assert compute_rms(table, UNCORRECTED) > 1e-3
+    [record] = records
+    [slip] = record["bad_rows"]
+    assert slip["kind"] in ("zeros", "held_point")
+    assert len(slip["rows"]) == 1
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("frame", ["base", "tracker"])
-def test_the_truth_on_the_plant_is_near_what_is_stated_whether_the_base_is_known_or_not(
-    frame,
-):
-    rows = compare_stated_accuracy(
-        ROBOTS / "kuka.yaml", "link_elasticity", 1827404023, frame
-    )
+def test_the_true_error_is_near_the_stated_one_whether_the_base_is_known_or_not(frame):
+    robot_file = ROBOTS / "kuka.yaml"
+    rows = compare_stated_accuracy(robot_file, "link_elasticity", 1827404023, frame)
     assert [row["part"] for row in rows] == list(STATED_PARTS)
     for row in rows:
-        # 22 µm of 20 µm: 30 poses under 60 µm of noise. An unknown base used to cost
-        # millimetres.
+        # The true error is about 22 µm where 20 µm are stated: 30 poses under 60 µm of
+        # noise. An unknown base once cost millimetres.
         assert 0.5 < row["true_rms_m"] / row["rms_m"] < 1.6
         assert row["rms_m"] < row["rms_bound_m"] < 2.0 * row["rms_m"]
 
 
-def make_rows(true_rms_m, decision="pass", verdict="named", frame="base"):
-    count = len(true_rms_m)
-    stated = {
-        "rms_m": 2e-5,
-        "rms_bound_m": 3e-5,
-        "worst_m": 5e-5,
-        "worst_bound_m": 6e-5,
-        "tolerance_m": 4e-5,
-    }
-    rows = pd.DataFrame(
+def make_accuracy_rows(true_rms_m, decision="pass", verdict="named", frame="base"):
+    return pd.DataFrame(
         {
             "true_rms_m": true_rms_m,
             "true_worst_m": 2.0 * np.array(true_rms_m),
-            "part": ["random"] * count,
+            "part": "random",
+            "frame": frame,
+            "decision": decision,
+            "verdict": verdict,
+            "rms_m": 2e-5,
+            "rms_bound_m": 3e-5,
+            "worst_m": 5e-5,
+            "worst_bound_m": 6e-5,
+            "tolerance_m": 4e-5,
         }
     )
-    return rows.assign(frame=frame, decision=decision, verdict=verdict, **stated)
 
 
-def test_shares_are_of_the_cases_that_a_question_concerns_with_exact_intervals():
-    found = compute_coverage(
-        pd.concat(
-            [
-                make_rows([1e-5, 2e-5, 5e-5]),
-                make_rows([3.5e-5], "fail", "several", "tracker"),
-            ]
-        )
+def test_shares_count_the_cases_that_a_question_concerns_and_have_exact_intervals():
+    rows = pd.concat(
+        [
+            make_accuracy_rows([1e-5, 2e-5, 5e-5]),
+            make_accuracy_rows([3.5e-5], "fail", "several", "tracker"),
+        ]
     )
-    found = found[(found["part"] == "random") & (found["verdict"] == "all")].set_index(
-        ["question", "frame"]
-    )
-    below = found.loc[("rms below its 95 % bound", "all")]
-    denied = found.loc[("pass that the truth denies", "all")]
-    assert (below["cases"], below["hits"], denied["cases"], denied["hits"]) == (
-        4,
-        2,
-        3,
-        1,
-    )
-    assert (below["low"], below["high"]) == pytest.approx((0.0676, 0.9324), abs=1e-4)
-    assert found.loc[("fail that the truth denies", "all"), "hits"] == 1
-    assert found.loc[("rms below its 95 % bound", "tracker"), "hits"] == 0
+    coverage = compute_coverage(rows)
+    coverage = coverage[
+        (coverage["part"] == "random") & (coverage["verdict"] == "all")
+    ].set_index(["question", "frame"])
+    below_bound = coverage.loc[("rms below its 95 % bound", "all")]
+    assert (below_bound["cases"], below_bound["hits"]) == (4, 2)
+    limits = (below_bound["low"], below_bound["high"])
+    assert limits == pytest.approx((0.0676, 0.9324), abs=1e-4)
+    false_passes = coverage.loc[("pass that the truth denies", "all")]
+    assert (false_passes["cases"], false_passes["hits"]) == (3, 1)
+    assert coverage.loc[("fail that the truth denies", "all"), "hits"] == 1
+    assert coverage.loc[("rms below its 95 % bound", "tracker"), "hits"] == 0

@@ -1,5 +1,5 @@
-"""The oracle knows the effect and its joints and is judged like the engine; of the best
-analyst nobody is right more often."""
+"""The oracle knows the effect and its joints and is judged like the diagnosis; the best
+analyst is right more often than anyone else."""
 
 import json
 from dataclasses import replace
@@ -17,150 +17,150 @@ from elastocal_proof.blind import oracle as module
 from elastocal_proof.blind.cases import BlindCase, list_cases, write_sealed_case
 from elastocal_proof.blind.oracle import (
     assess_best_analyst,
+    assess_sampled_case,
     compute_log_bayes_factors,
     fit_oracle,
     list_variants,
 )
 
 
-def keys(effect, joints, robot):
-    return [
-        [c.key for c in members]
-        for members in list_variants(
-            effect, joints, candidates_on(build_sites(robot)).values()
-        )
-    ]
+@pytest.fixture
+def list_keys(kuka):
+    """List the keys of the candidates of each variant of an effect at some joints."""
+    candidates = candidates_on(build_sites(kuka)).values()
+
+    def keys_of(variant):
+        return [candidate.key for candidate in variant]
+
+    def list_keys(effect, joints):
+        return [*map(keys_of, list_variants(effect, joints, candidates))]
+
+    return list_keys
 
 
-def test_members_are_the_candidates_at_the_true_joints(kuka):
-    assert keys("joint_offset", (3,), kuka) == [["joint_offset@3"]]
-    (weights,) = keys("link_weight", (2, 3), kuka)
-    assert {key.partition("[")[0] for key in weights} == {
-        "link_weight@2",
-        "link_weight@3",
-    }
+def test_a_variant_consists_of_the_candidates_at_the_true_joints(list_keys):
+    assert list_keys("joint_offset", (3,)) == [["joint_offset@3"]]
+    [weights] = list_keys("link_weight", (2, 3))
+    locations = {key.partition("[")[0] for key in weights}
+    assert locations == {"link_weight@2", "link_weight@3"}
 
 
-def made(folder, *effects, level=200.0, setting="weight_compensated"):
-    """A case of a seed of its own: its truth and its folder; of an arm that weighs
-    nothing, for the engine of the loop."""
-    key = "/".join((*effects, setting))
-    levels = (level,) * len(effects)
-    changes = PLAN["settings"][setting]
+def test_the_oracle_fits_what_the_diagnosis_names_rightly(tmp_path):
+    # The arm weighs nothing, so that the diagnosis is fast.
+    setting = "weight_compensated"
     case = BlindCase(
-        key, "single", "kuka", effects, levels, setting, 271828, changes=changes
+        f"joint_offset/{setting}",
+        "single",
+        "kuka",
+        ("joint_offset",),
+        (200.0,),
+        setting,
+        271828,
+        changes=PLAN["settings"][setting],
     )
-    write_sealed_case(case, folder / "blind", folder / "sealed", ROBOTS)
-    truth = json.loads(
-        (folder / "sealed" / f"{case.name}.json").read_text(encoding="utf-8")
-    )
-    return truth, (folder / "blind" / case.name).as_posix()
-
-
-def test_what_the_engine_names_rightly_the_oracle_fits_the_same_and_without_an_effect_the_declared_model(
-    tmp_path,
-):
-    truth, folder = made(tmp_path, "joint_offset")
+    write_sealed_case(case, tmp_path / "blind", tmp_path / "sealed", ROBOTS)
+    sealed = tmp_path / "sealed" / f"{case.name}.json"
+    truth = json.loads(sealed.read_text(encoding="utf-8"))
+    folder = (tmp_path / "blind" / case.name).as_posix()
     verdict = diagnose_folder(folder, ROBOTS.as_posix(), 1)
     assert [effect["name"] for effect in verdict["effects"]] == ["joint_offset"]
-    found = fit_oracle(truth, verdict, folder, ROBOTS.as_posix(), 1)
-    assert found["candidates"] == [f"joint_offset@{truth['defects'][0]['joints'][0]}"]
-    assert found["detected"] and found["p_value"] < 1e-6
-    # The engine has a prior on the size and a size of the pose error: both cost next to
-    # nothing here.
-    assert found["heldout"] == pytest.approx(verdict["heldout"]["after"], rel=2e-3)
-    found = fit_oracle({"defects": []}, verdict, folder, ROBOTS.as_posix(), 1)
-    assert found["heldout"] == verdict["heldout"]["before"] and not found["detected"]
+    informed = fit_oracle(truth, verdict, folder, ROBOTS.as_posix(), 1)
+    [joint] = truth["defects"][0]["joints"]
+    assert informed["candidates"] == [f"joint_offset@{joint}"]
+    assert informed["detected"]
+    assert informed["p_value"] < 1e-6
+    # The diagnosis has a prior of the size and estimates the pose error; both change
+    # the errors very little here.
+    assert informed["heldout"] == pytest.approx(verdict["heldout"]["after"], rel=2e-3)
+    # Without an effect the oracle has the declared model.
+    without_effect = fit_oracle({"defects": []}, verdict, folder, ROBOTS.as_posix(), 1)
+    assert without_effect["heldout"] == verdict["heldout"]["before"]
+    assert not without_effect["detected"]
 
 
-SOME = ("force_bias", "joint_tilt", "setup_step", "tracker_scale")
+SELECTED_EFFECTS = ("force_bias", "joint_tilt", "setup_step", "tracker_scale")
 
 
 @pytest.fixture(scope="module")
 def cases():
-    """A single defect at 200 for each of some kinds, and a pair, on the arm that is
-    solved fastest."""
+    """Single effects at 200, and a pair, on the arm that is solved fastest."""
     parts = [{"robots": ["kuka"], "single": 1, "levels": [200.0], "pair": 1}]
-    return list_cases(
-        PLAN | {"sizes": {"some": {"purpose": "limit", "parts": parts}}}, "some", 3
-    )
+    sizes = {"some": {"purpose": "limit", "parts": parts}}
+    return list_cases(PLAN | {"sizes": sizes}, "some", 3)
 
 
 @pytest.fixture
-def few(monkeypatch):
-    monkeypatch.setattr(module, "NAMED", SOME)
+def few_hypotheses(monkeypatch):
+    monkeypatch.setattr(module, "CATALOGUE_EFFECTS", SELECTED_EFFECTS)
 
 
 @pytest.mark.slow
 def test_bayes_factors_are_ratios_of_normal_densities():
     draws = np.random.default_rng(1)
-    units = draws.standard_normal((6, 16))
-    units /= np.linalg.norm(units, axis=0)
+    signals = draws.standard_normal((6, 16))
+    signals /= np.linalg.norm(signals, axis=0)
     residuals = draws.standard_normal((6, 3))
     columns = np.array([np.arange(8), np.arange(8, 16)])
-    found = compute_log_bayes_factors(
-        units.T @ units, units.T @ residuals, columns, 25.0
+    log_factors = compute_log_bayes_factors(
+        signals.T @ signals, signals.T @ residuals, columns, 25.0
     )
-    for number, chosen in enumerate(columns):
-        covariance = np.eye(6) + 25.0 / 8 * units[:, chosen] @ units[:, chosen].T
-        expected = [
-            multivariate_normal.logpdf(r, cov=covariance)
-            - multivariate_normal.logpdf(r, cov=np.eye(6))
-            for r in residuals.T
-        ]
-        np.testing.assert_allclose(found[number], expected, rtol=1e-9)
+    noise = multivariate_normal(cov=np.eye(6))
+    for hypothesis, chosen in enumerate(columns):
+        covariance = np.eye(6) + 25.0 / 8 * signals[:, chosen] @ signals[:, chosen].T
+        defect = multivariate_normal(cov=covariance)
+        expected = defect.logpdf(residuals.T) - noise.logpdf(residuals.T)
+        np.testing.assert_allclose(log_factors[hypothesis], expected, rtol=1e-9)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("effect", SOME)
-def test_a_defect_that_shows_well_is_detected_and_named(cases, few, effect):
+@pytest.mark.parametrize("effect", SELECTED_EFFECTS)
+@pytest.mark.usefixtures("few_hypotheses")
+def test_a_clearly_visible_defect_is_detected_and_named(cases, effect):
     case = next(case for case in cases if case.effects == (effect,))
-    found = assess_best_analyst(PLAN, case, ROBOTS)
-    assert found["detected"] and found["right"] and found["mechanisms"] == [effect]
-    assert found["probability"] > 0.9
+    conclusion = assess_best_analyst(PLAN, case, ROBOTS)
+    assert conclusion["detected"]
+    assert conclusion["right"]
+    assert conclusion["mechanisms"] == [effect]
+    assert conclusion["probability"] > 0.9
 
 
 @pytest.mark.slow
-def test_a_pair_is_named_and_what_hardly_shows_is_not_detected(cases, few):
-    single = next(case for case in cases if case.effects == (SOME[2],))
-    both = replace(
-        single, effects=(SOME[0], SOME[2]), levels=(200.0, 200.0), group="pair"
-    )
-    found = assess_best_analyst(PLAN, both, ROBOTS)
-    assert found["right"] and found["mechanisms"] == [SOME[0], SOME[2]]
-    assert not assess_best_analyst(PLAN, replace(single, levels=(0.5,)), ROBOTS)[
-        "detected"
-    ]
+@pytest.mark.usefixtures("few_hypotheses")
+def test_a_pair_is_named_and_a_hardly_visible_defect_is_not_detected(cases):
+    first, _, second, _ = SELECTED_EFFECTS
+    single = next(case for case in cases if case.effects == (second,))
+    pair = replace(single, effects=(first, second), levels=(200.0, 200.0), group="pair")
+    conclusion = assess_best_analyst(PLAN, pair, ROBOTS)
+    assert conclusion["right"]
+    assert conclusion["mechanisms"] == [first, second]
+    weak = replace(single, levels=(0.5,))
+    assert not assess_best_analyst(PLAN, weak, ROBOTS)["detected"]
 
 
 @pytest.mark.slow
-def test_a_sixth_of_the_cases_that_targets_compare_with_is_in_the_sample(monkeypatch):
+def test_a_sixth_of_the_cases_with_a_target_is_in_the_sample(monkeypatch):
     monkeypatch.setattr(
         module, "assess_best_analyst", lambda plan, case, robots_folder: {"right": True}
     )
 
-    def in_sample(seed, group="single", level=50.0, of="retained"):
-        truth = {
-            "case": {
-                "key": "k",
-                "group": group,
-                "robot": "kuka",
-                "effects": ["payload"],
-                "levels": [level],
-            }
-            | {"setting": "usual", "seed": seed},
-            "defects": [{"of": of}],
+    def is_sampled(seed, group="single", level=50.0, of="retained"):
+        case = {
+            "key": "k",
+            "group": group,
+            "robot": "kuka",
+            "effects": ["payload"],
+            "levels": [level],
+            "setting": "usual",
+            "seed": seed,
         }
-        return module.limit_of_sample(PLAN, truth, ROBOTS) is not None
+        truth = {"case": case, "defects": [{"of": of}]}
+        return assess_sampled_case(PLAN, truth, ROBOTS) is not None
 
-    # Of a binomial distribution, 99.9 %.
-    assert 70 <= sum(in_sample(seed) for seed in range(600)) <= 131
-    chosen = next(seed for seed in range(100) if in_sample(seed))
-    assert in_sample(chosen, "pair", 200.0) and in_sample(chosen, level=25.0)
-    assert not any(
-        (
-            in_sample(chosen, level=200.0),
-            in_sample(chosen, "outside"),
-            in_sample(chosen, of="raw"),
-        )
-    )
+    # These limits hold 99.9 % of a binomial distribution.
+    assert 70 <= sum(is_sampled(seed) for seed in range(600)) <= 131
+    sampled = next(seed for seed in range(100) if is_sampled(seed))
+    assert is_sampled(sampled, "pair", 200.0)
+    assert is_sampled(sampled, level=25.0)
+    assert not is_sampled(sampled, level=200.0)
+    assert not is_sampled(sampled, "outside")
+    assert not is_sampled(sampled, of="raw")

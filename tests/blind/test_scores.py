@@ -211,7 +211,7 @@ def test_the_credible_set_is_the_smallest_that_reaches_95_per_cent(shares, place
 def of_effect(document, found):
     return [
         row
-        for row in list_intervals(PLAN, document, found)
+        for row in list_intervals(document, found)
         if row["effect"] != "joint_compliance"
     ]
 

@@ -18,7 +18,7 @@ from elastocal.loop.loading import load_campaign
 from elastocal.loop.whole import judge_and_predict
 from elastocal_proof.audit.audit_run import find_checks
 from elastocal_proof.audit.finished_run import FinishedRun
-from elastocal_proof.blind.folders import write_blind_campaign
+from elastocal_proof.blind.folders import Experiment, write_blind_campaign
 from elastocal_proof.plant.arm import read_arm
 from elastocal_proof.plant.campaigns import Design, draw_schedule
 from elastocal_proof.plant.kinds import apply_defects, draw_defect
@@ -44,7 +44,10 @@ def diagnosed_campaign(top, robot, effects=(), **design):
         [draw_defect(effect, arm, 4) for effect in effects],
     )
     write_blind_campaign(
-        top / "cell", "cell", file, bad, planned, draw_schedule(arm, planned, 3)
+        top / "cell",
+        "cell",
+        file,
+        Experiment(bad, planned, draw_schedule(arm, planned, 3)),
     )
     results = top / "results/loop/cell"
     reports = top / "reports/loop/cell"

@@ -91,6 +91,8 @@ def verdict(
             "reduction_std_error": (reduction[1] - reduction[0]) / (2 * 1.959964),
         },
         "noise": {"degrees_of_freedom": freedom},
+        "repeatable": None,
+        "probabilities": None,
         "warnings": list(warnings),
         "compliance_urad_per_Nm": {
             "after": [compliance] * JOINTS,
@@ -129,7 +131,7 @@ def summary(*entries):
         [
             row
             for document, found, *_ in entries
-            for row in list_intervals(PLAN, document, found)
+            for row in list_intervals(document, found)
         ]
     )
     return summarize_figures(PLAN, frame(*entries), spans, 1).set_index(

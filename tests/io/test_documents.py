@@ -1,4 +1,4 @@
-"""YAML documents: read, and refused in one line that names file, key and what is
+"""YAML documents are read, or refused in one line that names file, key and what is
 allowed."""
 
 import math
@@ -66,9 +66,8 @@ def numbers_in(schema, path=()):
 
 
 @pytest.mark.parametrize("name", ["robot", "campaign"])
-def test_every_quantity_has_a_least_and_a_largest(name):
-    """A list of strange numbers would be left to some solver, which says nothing of the
-    key."""
+def test_every_quantity_has_a_smallest_and_a_largest_value(name):
+    """Without bounds, a solver would fail later with a message that lacks the key."""
     rules = dict(numbers_in(read_schema(name)))
     assert len(rules) > 4
     for path, rule in rules.items():
@@ -77,7 +76,7 @@ def test_every_quantity_has_a_least_and_a_largest(name):
 
 
 @pytest.mark.parametrize(
-    ("path", "value", "key", "words"),
+    ("path", "value", "key", "phrases"),
     [
         (("lengths_m", "l"), math.nan, "lengths_m.l", ["finite"]),
         (
@@ -120,20 +119,20 @@ def test_every_quantity_has_a_least_and_a_largest(name):
         (("stages", 0, "joints"), [1.5], "stages[0].joints[0]", ["1.5", "integer"]),
     ],
 )
-def test_a_faulty_robot_or_strategy_is_refused_in_one_line(path, value, key, words):
+def test_a_faulty_robot_or_strategy_is_refused_in_one_line(path, value, key, phrases):
     document, schema = (
         (STRATEGY, "strategy") if path[0] == "stages" else (ROBOT, "robot")
     )
-    with refused("x.yaml", f"{key}:", *words):
+    with refused("x.yaml", f"{key}:", *phrases):
         check_document(changed(document, path, value), schema, "x.yaml")
 
 
-# Each alias stands for so many values.
+# Each alias stands for 501 values.
 BOMB = "a: &a [" + "x, " * 500 + "x]\nb: [" + "*a, " * 400 + "*a]\n"
 
 
 @pytest.mark.parametrize(
-    ("text", "where", "words"),
+    ("text", "line", "phrases"),
     [
         (BOMB, "line 2", ["more values", str(MOST_VALUES), "aliases"]),
         ("a: &a [*a]\n", "line 1", ["alias *a", "no other anchor"]),
@@ -162,12 +161,14 @@ BOMB = "a: &a [" + "x, " * 500 + "x]\nb: [" + "*a, " * 400 + "*a]\n"
         (f"seed: {'9' * 5000}\n", "line 1", ["999", "18 digits"]),
     ],
 )
-def test_what_is_no_plain_document_is_refused_at_once(tmp_path, text, where, words):
-    with at_once(), refused(f"{tmp_path / 'a.yaml'}: {where}", where, *words):
+def test_a_text_that_is_no_plain_document_is_refused_at_once(
+    tmp_path, text, line, phrases
+):
+    with at_once(), refused(f"{tmp_path / 'a.yaml'}: {line}", line, *phrases):
         read(tmp_path, text)
 
 
-def test_numbers_are_read_as_people_write_them(tmp_path):
+def test_decimal_numbers_are_read(tmp_path):
     values = read(tmp_path, "[6e-5, 6E5, -1.5e5, 1.e3, .5, 17, +3, '1e5', a1e5]")
     assert values == [6e-5, 6e5, -1.5e5, 1e3, 0.5, 17, 3, "1e5", "a1e5"]
 
@@ -186,11 +187,11 @@ FORMULAS = ["=1+1", "@SUM(A1)", "+x", "-x", "＝1"]
 
 
 @pytest.mark.parametrize("text", [*STEERING, *FORMULAS])
-def test_what_would_steer_a_terminal_or_a_spreadsheet_is_refused_wherever_it_stands(
+def test_control_characters_and_spreadsheet_formulas_are_refused_everywhere(
     tmp_path, text
 ):
-    """In a key as in a value; in the robot file as in the campaign; the message shows
-    it as escapes."""
+    """They are refused in keys and values, and in every kind of document; the message
+    shows escapes."""
     allowed = (
         "printable characters on one line"
         if text in STEERING
@@ -210,7 +211,7 @@ def test_what_would_steer_a_terminal_or_a_spreadsheet_is_refused_wherever_it_sta
 
 
 @pytest.mark.parametrize("name", ["../robots/one", "one.yaml", "", ".", "x" * 5000])
-def test_a_document_is_named_and_not_reached_by_a_path(tmp_path, name):
+def test_a_document_is_found_by_its_name_and_not_by_a_path(tmp_path, name):
     (tmp_path / "robots").mkdir()
     (tmp_path / "robots" / "one.yaml").write_text(
         yaml.safe_dump(ROBOT), encoding="utf-8"
@@ -236,7 +237,7 @@ def test_a_document_is_named_and_not_reached_by_a_path(tmp_path, name):
         ("- 1\n", "yaml: found [1]", "keys with values"),
     ],
 )
-def test_what_a_schema_refuses_is_named_with_its_line(tmp_path, text, key, allowed):
+def test_a_refused_key_is_named_with_its_line(tmp_path, text, key, allowed):
     path = tmp_path / "a.yaml"
     with refused(path, key, allowed):
         check_document(read(tmp_path, text), "strategy", path.as_posix())

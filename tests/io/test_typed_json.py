@@ -1,4 +1,4 @@
-"""Dataclasses survive the way through JSON, and wrong documents are refused by key."""
+"""Dataclasses survive JSON, and the error of a wrong document names the key."""
 
 import json
 from dataclasses import dataclass, field
@@ -48,7 +48,7 @@ DRAWING = Drawing((ORIGIN, Circle(ORIGIN, 2.0)), {"pen": 1}, None, {"any": [1, "
 
 
 @pytest.mark.parametrize("closed", [False, True])
-def test_a_dataclass_survives_the_way_through_json(closed):
+def test_a_dataclass_survives_json(closed):
     drawing = Drawing(DRAWING.shapes, {}, 0.5, None, closed)
     document = json.loads(json.dumps(to_document(drawing)))
     assert ("closed" in document) == closed

@@ -52,7 +52,7 @@ def made_tables():
         [
             row
             for document, stated, _ in entries
-            for row in list_intervals(PLAN, document, stated)
+            for row in list_intervals(document, stated)
         ]
     )
     moves = _moves()

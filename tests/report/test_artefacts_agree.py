@@ -1,5 +1,4 @@
-"""What stands in several artefacts of a campaign is the same in all: PDF, HTML,
-verdict.json and the terminal."""
+"""PDF, page, verdict.json and terminal state the same numbers of a campaign."""
 
 import html
 import re
@@ -24,8 +23,8 @@ def pictures(tmp_path_factory):
     return empty_pictures(tmp_path_factory.mktemp("figures"), PICTURES)
 
 
-def bare(text):
-    """With single blanks, for breaks of lines differ from one artefact to the next."""
+def normalize_blanks(text):
+    """Replace blanks and line breaks, which differ between artefacts, by one blank."""
     return re.sub(r"\s+", " ", plainly(text).replace("\u200b", ""))
 
 
@@ -49,7 +48,7 @@ def test_artefacts_of_every_verdict_agree(
         .partition('<script type="application/json"')[0]
     )
     texts = {
-        "page": bare(
+        "page": normalize_blanks(
             html.unescape(
                 re.sub(r"<style>.*?</style>|<[^>]+>", " ", page, flags=re.DOTALL)
             )
@@ -57,7 +56,7 @@ def test_artefacts_of_every_verdict_agree(
     }
     if shutil.which("pdftotext"):
         shown = ["pdftotext", "-raw", str(folder / "report.pdf"), "-"]
-        texts["report"] = bare(
+        texts["report"] = normalize_blanks(
             subprocess.run(shown, capture_output=True, text=True, check=True).stdout
         )
     faulty = bool(verdict.faults)
@@ -69,19 +68,24 @@ def test_artefacts_of_every_verdict_agree(
     ]
     wanted = [] if faulty else [1e3 * getattr(errors, stage).rms_m for stage in stages]
     for name, text in (
-        texts | {"terminal": bare(" ".join(describe_outcome([f"{folder}/report.pdf"])))}
+        texts
+        | {
+            "terminal": normalize_blanks(
+                " ".join(describe_outcome([f"{folder}/report.pdf"]))
+            )
+        }
     ).items():
-        found = re.findall(
+        matches = re.findall(
             rf"{' ?→ ?'.join([r'([0-9.]+)'] * len(stages))} mm(?: ?\(noise ([\d.]+)\))?",
             text,
         )
-        *stated, noise = found[0] if found and not faulty else [""]
+        *stated, noise = matches[0] if matches and not faulty else [""]
         assert [float(value) for value in stated] == pytest.approx(
             wanted, rel=5e-3, abs=5.1e-4
         ), name
-        known = None if faulty else errors.noise_floor_rms_m
+        floor_m = 0.0 if faulty else errors.noise_floor_rms_m
         assert float(noise or 0) == pytest.approx(
-            1e3 * (known or 0), rel=5e-3, abs=5.1e-4
+            1e3 * (floor_m or 0), rel=5e-3, abs=5.1e-4
         ), name
     # On page 1 the probability of a cause and its cost follow each other.
     causes = [

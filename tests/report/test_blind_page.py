@@ -1,4 +1,4 @@
-"""The page of targets has each quantity once with its robots and its limit."""
+"""The page of targets has one row for each quantity, with its robots and its limit."""
 
 import pandas as pd
 from made_blind_documents import (
@@ -19,7 +19,7 @@ from elastocal_proof.report.blind_page import (
 )
 
 
-def test_each_quantity_stands_beside_its_target_with_each_robot_alone_and_the_limit():
+def test_each_quantity_has_its_target_its_limit_and_a_column_for_each_robot():
     pairs = [
         truth(("payload",), ("joint_tilt", 2), group="pair", robot=robot)
         for robot in ("irb7600", "gen3")
@@ -49,11 +49,10 @@ def test_each_quantity_stands_beside_its_target_with_each_robot_alone_and_the_li
         for line in page.splitlines()
         if line.startswith("| ")
     ]
-    found = {row[0]: dict(zip(rows[0], row, strict=True)) for row in rows[1:]}
-    # Of the quantities with a target those of single effects at 50 and 200 have no
-    # case, and so no row.
-    assert len(found) == len(rows) - 1 == int((summary.target != "").sum())
-    assert found["both of two effects, at 50 each"] == {
+    figures = {row[0]: dict(zip(rows[0], row, strict=True)) for row in rows[1:]}
+    # A quantity without a case has no row.
+    assert len(figures) == len(rows) - 1 == int((summary.target != "").sum())
+    assert figures["both of two effects, at 50 each"] == {
         "quantity": "both of two effects, at 50 each",
         "target": "at least 95 % of the limit",
         "outcome": "missed",
@@ -64,7 +63,7 @@ def test_each_quantity_stands_beside_its_target_with_each_robot_alone_and_the_li
         "limit, on a sample": "100.0 % (15.8–100.0 %), 2 of 2",
         "found over limit, same sample": "50.0 % (0.0–100.0 %)",
     }
-    alarms = found["false alarms, 3 kN"]
+    alarms = figures["false alarms, 3 kN"]
     assert (alarms["outcome"], alarms["cases"], alarms["limit, on a sample"]) == (
         "no case",
         "0 of 0",
@@ -72,7 +71,7 @@ def test_each_quantity_stands_beside_its_target_with_each_robot_alone_and_the_li
     )
 
 
-def test_how_many_are_reached_says_on_which_robots():
+def test_the_number_of_reached_targets_names_the_robots():
     fine = summarize_figures(
         PLAN, frame(*[(truth(), silence(), oracle(1.0))] * 100), pd.DataFrame(), 1
     )

@@ -1,4 +1,4 @@
-"""What a certificate states, and that it is typeset."""
+"""A certificate states its decision with criterion and risk, and is typeset."""
 
 import json
 
@@ -11,7 +11,7 @@ from elastocal.report.typesetting import compile_document
 
 
 @pytest.mark.parametrize(
-    ("decision", "changed", "words"),
+    ("decision", "changed", "phrases"),
     [
         (
             "pass",
@@ -32,18 +32,21 @@ from elastocal.report.typesetting import compile_document
         ),
     ],
 )
-def test_decisions_come_with_their_criterion_and_risk(decision, changed, words):
+def test_decisions_come_with_their_criterion_and_risk(decision, changed, phrases):
     text = collect_certificate_facts(make_document(decision, **changed))[
         "decision_sentences"
     ]
-    criterion = "the predicted RMS position error of the corrected robot, 95 % sure to be below 0.160 mm, against the tolerance of"
-    for word in (
-        *words,
-        f"{criterion} 0.200 mm",
+    criterion = (
+        "the predicted RMS position error of the corrected robot, 95 % sure to be "
+        "below 0.160 mm, against the tolerance of 0.200 mm"
+    )
+    for phrase in (
+        *phrases,
+        criterion,
         "Nobody has measured the corrected robot",
         "0.120 mm",
     ):
-        assert word in text
+        assert phrase in text
     assert ("too much to pass" in text) == (changed["risk_above"] == 0.4)
 
 

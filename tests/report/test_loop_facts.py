@@ -1,5 +1,4 @@
-"""What the report of a campaign states fits together, is said in words that people
-know, and compiles, whatever the verdict."""
+"""The facts of a report are consistent and in plain words for every verdict."""
 
 import json
 import re
@@ -33,24 +32,36 @@ from elastocal.verdict import Compliances
 WORDS = {
     "adequate": "none of 30 candidate causes is needed",
     "named": "lacks one mechanism: lost motion (backlash) of joint 3 (94 %).",
-    "named, location uncertain": "Its location is less certain: joint 3 (80 %) and joint 5 (20 %).",
-    "class": "most probably lost motion (backlash) of joint 3 (94 %). Instead of lost motion (backlash) it may be bearing tilt "
-    "or elastic bending and torsion: these measurements do not distinguish them.",
-    "class with a related mechanism": "Instead of lost motion (backlash) it may be a related mechanism",
-    "several": "lacks 2 mechanisms: lost motion (backlash) of joint 3 (94 %; 0.085 mm) and weight of an undeclared payload "
-    "(94 %; 0.085 mm)",
-    "unexplained": "a smooth error of unknown cause explains it better than any of 30 candidate causes",
+    "named, location uncertain": (
+        "Its location is less certain: joint 3 (80 %) and joint 5 (20 %)."
+    ),
+    "class": (
+        "most probably lost motion (backlash) of joint 3 (94 %). Instead of lost motion "
+        "(backlash) it may be bearing tilt or elastic bending and torsion: these "
+        "measurements do not distinguish them."
+    ),
+    "class with a related mechanism": (
+        "Instead of lost motion (backlash) it may be a related mechanism"
+    ),
+    "several": (
+        "lacks 2 mechanisms: lost motion (backlash) of joint 3 (94 %; 0.085 mm) and "
+        "weight of an undeclared payload (94 %; 0.085 mm)"
+    ),
+    "unexplained": (
+        "a smooth error of unknown cause explains it better than any of 30 candidate "
+        "causes"
+    ),
     "not_testable": "show neither that something is missing nor that nothing is",
     "fault of the data": "The loads fit as if they were written in kilonewtons.",
 }
 
 
 @pytest.mark.parametrize("campaign", CAMPAIGNS)
-def test_facts_are_json_and_the_verdict_is_said_in_plain_words(campaign):
+def test_facts_are_json_and_the_verdict_is_in_plain_words(campaign):
     facts = facts_of(CAMPAIGNS[campaign], experiment=experiment_rows())
     said = json.dumps(facts, allow_nan=False, ensure_ascii=False)
     assert WORDS.get(campaign, "") in plainly(" ".join(facts["sentences"]))
-    # No sentence has a hole, a double blank or what a template leaves behind.
+    # No sentence has a gap, a double blank or a tag of a template.
     assert not re.search(
         r"  | [.,;:] |\{|None|Undefined|\.\.\"",
         " ".join(facts["sentences"] + facts["now"]),
@@ -58,13 +69,14 @@ def test_facts_are_json_and_the_verdict_is_said_in_plain_words(campaign):
     assert "{{" not in said and "{%" not in said
 
 
-def test_what_to_do_follows_from_the_verdict_and_from_the_gain():
+def test_the_advice_follows_from_the_verdict_and_the_gain():
     def now(verdict, experiment=()):
         return render_campaign_sentences(verdict, experiment=experiment)["now"]
 
-    ends = ((0.15, 0.32), (-0.3, -0.1), (-0.1, 0.3))
+    intervals = ((0.15, 0.32), (-0.3, -0.1), (-0.1, 0.3))
     gained, lost, unsure = (
-        now(make_verdict(NAMED, [effect_entry()], reduction=each))[0] for each in ends
+        now(make_verdict(NAMED, [effect_entry()], reduction=interval))[0]
+        for interval in intervals
     )
     assert (
         gained.startswith("Use the corrected model")
@@ -93,7 +105,7 @@ def test_what_to_do_follows_from_the_verdict_and_from_the_gain():
     ("changed", "words"),
     [
         ({"cost_m": 8.5e-5}, "0.085 mm"),
-        # A third of 84 µm are 28: the error would be 88 µm without.
+        # A third of 84 µm is 28 µm; without the effect the error would be 88 µm.
         ({"cost_m": 2.9e-5}, "0.029 mm"),
         ({"cost_m": 1.5e-5, "probability": 0.996}, "0.015 mm: real, negligible"),
         ({"cost_m": 1.5e-5, "probability": 0.7}, "0.015 mm: negligible"),
@@ -105,14 +117,14 @@ def test_what_to_do_follows_from_the_verdict_and_from_the_gain():
         ),
     ],
 )
-def test_each_cause_states_its_cost_and_small_ones_are_negligible(changed, words):
+def test_each_cause_states_its_cost_and_a_small_cost_is_negligible(changed, words):
     assert (
         format_cost(replace(effect_entry(), **changed), CAMPAIGNS["named"].heldout)
         == words
     )
 
 
-def test_causes_are_those_found_and_what_else_is_probable_with_the_probabilities_of_the_verdict():
+def test_causes_are_the_missing_effects_and_other_probable_mechanisms():
     sets = [
         ({"lost_motion": ["joint 3"]}, 0.6),
         ({"joint_tilt": ["joint 2"], "other": [""]}, 0.36),
@@ -145,9 +157,9 @@ def test_a_fault_of_the_data_is_no_effect():
         ["newtons for each unit of force written", "1000", "N"],
         ["poses compared", "12", ""],
     ]
-    assert [plainly(each) for each in fault["evidence"]] == ["500 mm", "100 µm"]
+    assert [plainly(distance) for distance in fault["evidence"]] == ["500 mm", "100 µm"]
     assert fault["alternatives"] == "a load that is 1000 times larger"
-    # What was fitted to data that are wrong says nothing of the model.
+    # A fit to faulty data says nothing about the model.
     assert (
         facts["warnings"] == []
         and facts["probabilities"] == ""
@@ -156,19 +168,18 @@ def test_a_fault_of_the_data_is_no_effect():
     assert not facts_of(CAMPAIGNS["named"])["faulty"]
 
 
-def test_parameters_stand_in_readable_units_with_what_determines_them_and_of_whom_they_are():
+def test_parameters_have_readable_units_their_source_and_their_location():
     effect = effect_entry()
     heldout = CAMPAIGNS["named"].heldout
     assert describe_effect(effect, heldout)["parameters"] == [
         ["half play", "120.0 ± 3.0", "µrad", "measurements"]
     ]
-    # What the measurements do not identify is counted, and no number of it is printed.
+    # An unidentifiable parameter is counted, but its value is not printed.
     hidden = replace(effect.parameters[0], identifiable=False)
     effect = replace(effect, parameters=(hidden, *effect.parameters[1:]))
     facts = describe_effect(effect, heldout)
     assert (facts["parameters"], facts["held"]) == ([], 1)
-    # What belongs to an effect as a whole, such as its largest sag, stands without a
-    # member.
+    # A quantity of the whole effect, such as its largest sag, has no location.
     effect = effect_entry(
         "link_weight",
         ("link_weight@2", "link_weight@3"),
@@ -206,7 +217,7 @@ def test_before_and_after_have_intervals_and_multiples():
     ]
 
 
-def test_of_a_compliance_that_is_not_identifiable_no_number_is_stated_and_of_a_file_that_fits_none_all_are():
+def test_an_unidentifiable_compliance_has_no_number_unless_none_is_fitted():
     rows = tabulate_compliances(
         Compliances((0.5, 0.4), (0.48, 0.4), (0.01, 0.0), (True, False))
     )

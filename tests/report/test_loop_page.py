@@ -1,5 +1,4 @@
-"""The page to look into: it draws what the tables have, asks nothing of the network,
-and every control works by key."""
+"""The interactive page draws the tables, needs no network, and works by keyboard."""
 
 import json
 import re
@@ -17,10 +16,16 @@ from elastocal.mechanics.kinematics import locate_corners
 from elastocal.report.loop_page import build_loop_page, write_loop_page
 
 CHROMIUM = shutil.which("chromium")
-# Colour of what the page and a plot are drawn on.
-PAPER_OF_PAGE = "getComputedStyle(document.body).backgroundColor.match(/\\d+/g).slice(0, 3).map(Number)"
-PAPER_OF_PLOT = "[...document.getElementById('scatter').getContext('2d').getImageData(1, 1, 1, 1).data].slice(0, 3)"
-# Whether all that is drawn in space lies on its canvas.
+# Background colours of the page and of a plot.
+PAPER_OF_PAGE = (
+    "getComputedStyle(document.body).backgroundColor"
+    ".match(/\\d+/g).slice(0, 3).map(Number)"
+)
+PAPER_OF_PLOT = (
+    "[...document.getElementById('scatter').getContext('2d')"
+    ".getImageData(1, 1, 1, 1).data].slice(0, 3)"
+)
+# Whether everything that is drawn in space lies on its canvas.
 ALL_IN_SIGHT = """() => {
   const canvas = document.getElementById('robot');
   const { shown, ends } = projection(canvas.clientWidth, canvas.clientHeight);
@@ -52,7 +57,7 @@ def written(kuka, tmp_path_factory):
     return path
 
 
-def test_measurements_are_in_metres_and_micrometres_with_what_they_may_be_drawn_against(
+def test_measurements_are_in_metres_residuals_in_micrometres_against_quantities(
     kuka,
 ):
     table = residual_table()
@@ -70,21 +75,21 @@ def test_measurements_are_in_metres_and_micrometres_with_what_they_may_be_drawn_
     np.testing.assert_allclose(
         against["angle of joint 2"]["values"], np.degrees(table["q2"]), rtol=1e-4
     )
-    # What does not vary explains nothing.
+    # A constant quantity explains nothing.
     assert all(np.ptp(entry["values"]) > 0 for entry in data["against"])
 
 
-def test_the_robot_is_drawn_at_the_angles_of_the_model_whatever_its_controller_reports(
+def test_the_robot_is_drawn_at_the_angles_of_the_model(
     kuka,
 ):
     table = residual_table()
     verdict = CAMPAIGNS["named"]
-    other = replace(
+    with_coupled_joints = replace(
         kuka,
         reported_matrix=np.diag([1.0, -1, -1, 1, 1, 1]),
         reported_offset=np.full(6, 0.3),
     )
-    _, data = build_loop_page(facts_of(verdict), table, other)
+    _, data = build_loop_page(facts_of(verdict), table, with_coupled_joints)
     np.testing.assert_allclose(
         data["outlines"][0],
         locate_corners(kuka.chain, stack_joint_angles(table, 6)[:1])[:, 0],
@@ -92,8 +97,8 @@ def test_the_robot_is_drawn_at_the_angles_of_the_model_whatever_its_controller_r
     )
 
 
-def test_texts_of_other_people_stay_texts(kuka, tmp_path):
-    """A campaign may be called anything; what it is called is shown and never run."""
+def test_texts_from_files_are_never_run(kuka, tmp_path):
+    """A campaign may have any name; the page shows it as text."""
     page, data = page_of(kuka)
     evil = "</script><script>alert(1)</script>"
     data = data | {"poses": [evil]}
@@ -105,7 +110,7 @@ def test_texts_of_other_people_stay_texts(kuka, tmp_path):
     assert data_in(path)["poses"] == [evil]
 
 
-def test_the_page_names_nothing_that_a_browser_would_fetch(written):
+def test_the_page_refers_to_no_file_but_the_report(written):
     text = re.sub(
         r"<script>.*?</script>",
         "",
@@ -148,20 +153,20 @@ def test_in_a_browser_every_control_works_by_key_and_nothing_leaves_the_page(
         assert papers[0] == papers[1] and (min(papers[0]) > 200) == (scheme == "light")
         assert page.evaluate(ALL_IN_SIGHT)
 
-        # What is fitted and what validates are not thrown together.
+        # Errors of fitted and of validation poses are stated separately.
         table = residual_table()
-        for part, held_out in (("fitted", False), ("validation", True)):
-            off = (
+        for poses, held_out in (("fitted", False), ("validation", True)):
+            residual_um = (
                 1e6
                 * np.column_stack([table[f"before_d{axis}"] for axis in "xyz"])[
                     table["held_out"] == held_out
                 ]
             )
-            root = np.sqrt((off**2).sum(axis=1).mean())
+            root = np.sqrt((residual_um**2).sum(axis=1).mean())
             stated = re.search(
-                rf"before .*?([\d.]+) µm \({part}\)", page.inner_text("#scatter-words")
+                rf"before .*?([\d.]+) µm \({poses}\)", page.inner_text("#scatter-words")
             )
-            assert float(stated[1]) == pytest.approx(root, rel=6e-3), part
+            assert float(stated[1]) == pytest.approx(root, rel=6e-3), poses
 
         def drawn(plot):
             return page.evaluate(f"document.getElementById('{plot}').toDataURL()")

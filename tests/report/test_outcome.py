@@ -1,4 +1,4 @@
-"""The terminal says of each report where it is and, of a campaign, the verdict."""
+"""The terminal names each report and states the verdict on a campaign."""
 
 from made_loop_tables import CAMPAIGNS
 
@@ -9,29 +9,29 @@ from elastocal.verdict import write_verdict
 def test_the_outcome_names_reports_and_verdicts(tmp_path):
     folder = tmp_path / "reports/loop/cell7"
     folder.mkdir(parents=True)
-    made = [
+    files = [
         "reports/study.pdf",
         "reports/loop/cell7/report.pdf",
         "reports/tables/table1.csv",
     ]
-    said = {}
+    lines = {}
     for name in ("not_testable", "named"):
         write_verdict(folder / "verdict.json", CAMPAIGNS[name])
-        said[name] = describe_outcome(made, tmp_path)
-    first, errors, *rest = said["not_testable"]
-    assert first.startswith(
+        lines[name] = describe_outcome(files, tmp_path)
+    verdict_line, errors, *following_lines = lines["not_testable"]
+    assert verdict_line.startswith(
         "! cell7: Whatever a mechanism of the catalogue would contribute"
     )
     assert errors.startswith("  0.171 → ") and errors.endswith(
         " mm (noise 0.050), RMS position error on 10 validation poses"
     )
-    following = 'next: "What to do now" on the first page of the report'
-    assert rest == [
+    advice = 'next: "What to do now" on the first page of the report'
+    assert following_lines == [
         "  report: reports/loop/cell7/report.pdf",
         "the study: reports/study.pdf",
-        following,
+        advice,
     ]
-    assert said["named"][0].startswith(
+    assert lines["named"][0].startswith(
         "✓ cell7: The declared model lacks one mechanism"
     )
-    assert said["named"][-1] == "next: elastocal correct, elastocal certificate"
+    assert lines["named"][-1] == "next: elastocal correct, elastocal certificate"

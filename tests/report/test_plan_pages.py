@@ -14,14 +14,14 @@ from elastocal.report.plan_pages import collect_plan_facts
 from elastocal.report.typesetting import compile_document
 
 
-def made():
+def make_plan():
     survey = make_survey()
     plan = choose_plan(survey, make_candidates(survey, 300), 14, 4, 1)
     return survey, plan, build_sheet(survey, plan)
 
 
 def test_a_row_has_the_angles_in_degrees_and_as_many_boxes_as_measurements():
-    survey, plan, rows = made()
+    survey, plan, rows = make_plan()
     facts = collect_plan_facts(survey, plan, rows, ["worth"])
     angles = np.concatenate([plan.fitted.joint_angles, plan.held_out.joint_angles])
     assert len(facts["rows"]) == len(angles) == 18 and facts["fitted"] == 14
@@ -31,17 +31,17 @@ def test_a_row_has_the_angles_in_degrees_and_as_many_boxes_as_measurements():
         assert len(row["cells"]) + 1 == len(facts["heads"])
     boxes = sum(visit["count"] for row in facts["rows"] for visit in row["visits"])
     assert boxes * len(survey.targets) == len(rows)
-    # Where the reflector has to sit, which no error afterwards shows.
-    known = replace(survey, targets=(Target("T", "tool0", (0.1, 0.0, 0.05)),))
+    # The sheet states where the reflector has to sit, because no later error shows it.
+    with_offset = replace(survey, targets=(Target("T", "tool0", (0.1, 0.0, 0.05)),))
     assert (
         "T on tool0, at (100.00, 0.00, 50.00) mm of it"
-        in collect_plan_facts(known, plan, rows, ["worth"])["targets"][0]
+        in collect_plan_facts(with_offset, plan, rows, ["worth"])["targets"][0]
     )
     assert "an offset that is fitted" in facts["targets"][0]
 
 
 def test_the_sheet_is_typeset(tmp_path):
-    facts = collect_plan_facts(*made(), ["It is worth the effort."])
+    facts = collect_plan_facts(*make_plan(), ["It is worth the effort."])
     pictures = empty_pictures(tmp_path, ["overview", "poses0"])
     compile_document(tmp_path / "plan.pdf", "plan.typ", {"facts": facts}, pictures)
     assert (tmp_path / "plan.pdf").read_bytes().startswith(b"%PDF")

@@ -1,5 +1,5 @@
-"""A document compiles with the data and pictures that it reads, and its PDF appears
-whole or not at all."""
+"""A document compiles with its data and pictures, and its PDF appears complete or not
+at all."""
 
 from importlib import resources
 
@@ -23,7 +23,7 @@ DATA = {"facts": {"name": "Übermaß µ", "rows": [[1, 2.5], [None, True]]}, "ot
 
 @pytest.fixture
 def written(tmp_path, monkeypatch):
-    """Folder of the results; documents stand in a folder beside it."""
+    """Return the folder of the results; the documents are in another folder."""
     documents = tmp_path / "documents"
     results = tmp_path / "results"
     documents.mkdir()
@@ -62,18 +62,19 @@ def test_a_document_that_cannot_be_compiled_leaves_the_earlier_pdf_unchanged(
     assert (written / "report.pdf").read_text(encoding="utf-8") == "earlier"
 
 
-def test_a_template_has_paragraphs_and_rows_and_keeps_what_may_not_break(
+def test_a_template_has_paragraphs_and_rows_and_keeps_non_breaking_blanks(
     tmp_path, monkeypatch
 ):
-    made = "# one\n{% for n in (1, 2) %}\nA {{ n | format_probability }}\n  line.\n\n{% endfor %}\n"
-    made += "## rows\na ¦ {{ b }} ¦\n{# no #}\n\nc ¦ d ¦ e\n"
-    (tmp_path / "made.txt").write_text(made, encoding="utf-8")
+    template = "# one\n{% for n in (1, 2) %}\nA {{ n | format_probability }}\n"
+    template += "  line.\n\n{% endfor %}\n"
+    template += "## rows\na ¦ {{ b }} ¦\n{# no #}\n\nc ¦ d ¦ e\n"
+    (tmp_path / "made.txt").write_text(template, encoding="utf-8")
     monkeypatch.setattr(resources, "files", {"elastocal.report": tmp_path}.__getitem__)
     sections = render_sentences("made.txt", FILTERS, b="x")
     assert sections == {
         "one": ["A >\u00a099\u00a0% line."] * 2,
         "rows": [["a", "x", ""], ["c", "d", "e"]],
     }
-    # A fact that a template shows but nobody passed is an error, not a gap.
+    # A missing fact is an error, not a gap in the text.
     with pytest.raises(UndefinedError, match="b"):
         render_sentences("made.txt", FILTERS)

@@ -1,5 +1,4 @@
-"""Effects, locations, hypotheses, numbers and units stand as a robot engineer writes
-them."""
+"""Effects, locations, hypotheses, numbers and units are written as a robot engineer does."""
 
 import pytest
 
@@ -21,14 +20,11 @@ from elastocal.report.words import (
 from elastocal.verdict import MechanismSet
 
 
-def test_every_effect_of_the_catalogue_brings_its_own_physical_name_and_a_kind():
+def test_every_effect_of_the_catalogue_has_a_physical_name_and_a_kind():
     named = {name: effect.words for name, effect in list_bundled_effects().items()}
     assert all(named.values()) and len(set(named.values())) == len(named)
-    assert not [
-        words
-        for words in named.values()
-        if "_" in words or words != words.strip() or words[0].isupper()
-    ]
+    for name in named.values():
+        assert "_" not in name and name == name.strip() and not name[0].isupper()
     assert all(find_common_kind(name, []) for name in list_bundled_effects())
 
 
@@ -71,16 +67,16 @@ def test_every_effect_of_the_catalogue_brings_its_own_physical_name_and_a_kind()
         ("payload", [""], "weight of an undeclared payload"),
     ],
 )
-def test_locations_are_gathered(effect, locations, expected):
+def test_locations_of_an_effect_are_joined(effect, locations, expected):
     assert format_located_effect(effect, locations).endswith(expected)
 
 
-def test_a_place_stands_without_the_effect_that_acts_there():
+def test_a_location_is_written_without_its_effect():
     assert format_location("joint_offset", "joint 3") == "joint 3"
     assert format_location("payload", "") == "the whole robot"
 
 
-def test_hypotheses_that_hold_the_first_are_stated_by_what_they_add_and_other_is_unknown_or_related():
+def test_a_hypothesis_that_contains_the_first_one_is_described_by_what_it_adds():
     sets = [
         ["link_weight"],
         ["link_weight", "other"],
@@ -102,7 +98,7 @@ def test_hypotheses_that_hold_the_first_are_stated_by_what_they_add_and_other_is
         "nothing is missing",
         UNKNOWN,
     ]
-    # Beside "nothing" all are stated in full.
+    # If the first hypothesis is "nothing", the others are described in full.
     assert (
         format_hypotheses(
             [MechanismSet(names, 0.5, {}) for names in ((), ("joint_offset",))]
@@ -128,21 +124,21 @@ def test_hypotheses_that_hold_the_first_are_stated_by_what_they_add_and_other_is
         (-4e-8, 1e-4, "m", ("0 ± 100", "µm")),
     ],
 )
-def test_values_come_in_units_that_suit_them(value, error, unit, expected):
+def test_values_have_suitable_units(value, error, unit, expected):
     assert format_with_unit(value, error, unit) == expected
 
 
-def test_no_probability_is_zero_or_one_and_lengths_and_lists_are_those_of_sentences():
-    said = [
+def test_probabilities_lengths_and_lists_are_written_as_in_sentences():
+    probabilities = [
         format_probability(value).replace("\u00a0", " ")
         for value in (0.0, 0.004, 0.02, 0.944, 0.996, 1.0)
     ]
-    assert said == ["< 1 %", "< 1 %", "2 %", "94 %", "> 99 %", "> 99 %"]
-    stated = [
+    assert probabilities == ["< 1 %", "< 1 %", "2 %", "94 %", "> 99 %", "> 99 %"]
+    lengths = [
         format_length(value).replace("\u00a0", " ")
         for value in (1.2345e-4, 0.9999e-3, 0.0213, None)
     ]
-    assert stated == ["123 µm", "1.00 mm", "21.3 mm", "unknown"]
+    assert lengths == ["123 µm", "1.00 mm", "21.3 mm", "unknown"]
     assert [
         format_millimetres(value) for value in (1.5e-5, 0.9999e-3, 1.184e-3, 0.0213)
     ] == [

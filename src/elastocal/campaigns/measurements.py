@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 from elastocal.campaigns.tables import HEADER_WITHOUT_ROWS, Cells, read_text_table
 from elastocal.counting import format_count
 from elastocal.errors import InputError, suggest_names
-from elastocal.io.atomic_writes import atomic_write
+from elastocal.io.atomic_writes import write_atomically
 from elastocal.io.storage import Column
 from elastocal.io.texts import describe_file_kind
 from elastocal.mechanics.components import WRENCH, WRENCH_NAMES
@@ -281,7 +281,7 @@ def write_measurements(
         column for name, column in describe_columns(joints).items() if name in table
     ]
     cells = [np.asarray(table[column.name]).tolist() for column in columns]
-    with atomic_write(path) as partial:
+    with write_atomically(path) as partial:
         if Path(path).name == CSV:
             _write_csv(partial, columns, cells)
         else:

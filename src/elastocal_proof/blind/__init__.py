@@ -1,5 +1,6 @@
-"""The blind proof: cases with sealed ground truth made on the plant, and what the
-verdicts on them are worth.
+"""The blind benchmark: cases with sealed ground truth from simulated robots, and scores
+of the verdicts on them.
 
-The only room that imports `plant`; beside it `loop` and what that imports.
+Only this package imports `plant`; of `elastocal` it imports `loop` and the layers
+below.
 """

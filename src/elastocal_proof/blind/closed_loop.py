@@ -1,19 +1,21 @@
-"""The loop closed on the plant: a robot with a hidden defect is measured, diagnosed,
-commanded by the result, measured again.
+"""Closed loop on the simulated robot: a robot with a hidden effect is measured,
+diagnosed, commanded by the result and measured again.
 
-Each wanted pose, which nobody's model has seen, is commanded five times: as the robot
-file has the arm, by a calibration of the geometry alone, by the declared model
-(geometry and springs), by the model that the diagnosis found, and by the plant itself,
-which leaves noise and repeatability. Beside it stands what is stated of the corrected
-robot's accuracy.
+Each wanted pose, which no model was fitted to, is commanded five times: as the robot
+file describes the arm, by a calibration of the geometry alone, by the declared model
+(geometry and joint compliances), by the model of the diagnosis, and by the simulated
+robot itself, which leaves only noise and repeatability. The stated accuracy of the
+corrected robot is compared with its true errors.
 """
 
 from __future__ import annotations
 
 import tempfile
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -27,13 +29,13 @@ from elastocal.application.frames import (
     Scope,
     compute_placement_columns,
     fit_placement,
+    select_free_parameters,
 )
 from elastocal.campaigns.reading import read_robot
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import apply_regression, remove_gross_errors
 from elastocal.diagnosis.settings import Settings
-from elastocal.effects.catalogue import declared_candidates
-from elastocal.effects.catalogue import list_effects as catalogue
+from elastocal.effects.catalogue import declared_candidates, list_effects
 from elastocal.exchange.target_path import OK
 from elastocal.fitting.model import build_declared_model
 from elastocal.fitting.noise import fit_declared_model
@@ -43,10 +45,10 @@ from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import write_table
 from elastocal.loop.whole import build_calibrated_robot, read_cases
 from elastocal.mechanics.kinematics import compute_jacobians, compute_pose_differences
-from elastocal.random_streams import open_stream as analysis_stream
+from elastocal.random_streams import open_stream
 from elastocal.validation.conformity import decide_conformity
 from elastocal_proof.blind import schemas
-from elastocal_proof.blind.folders import write_blind_campaign
+from elastocal_proof.blind.folders import Experiment, write_blind_campaign
 from elastocal_proof.blind.rehearsal import (
     ERRORS_OF_GEOMETRY,
     build_hidden_robot,
@@ -86,31 +88,32 @@ UNLOADED = "unloaded"
 LOADED = "loaded"
 MILLING = "milling"
 PARTS = (UNLOADED, LOADED, MILLING)
-# Of what an accuracy is stated: random poses without and with load together, and a
-# path.
+# An accuracy is stated for the random poses, without and with load together, and for
+# the path.
 STATED_PARTS = {"random": (UNLOADED, LOADED), MILLING: (MILLING,)}
-# Wanted poses of each part.
+# Wanted poses of each random part, and of the path.
 _POSES = 40
 _PATH = 60
-# Share of the joint limits from which they are drawn: what a cell uses.
-_REACH = 0.8
-# Of the force of milling over the usual one, and of its path over the reach of the arm:
-# 0.5 m on one of 2.5 m.
+# Share of the joint ranges that a cell uses, in which random poses are drawn.
+_RANGE_SHARE = 0.8
+# Milling force over the usual force, and length of the path over the reach of the arm:
+# 0.5 m on an arm of 2.5 m.
 _MILLING_SHARE = 0.5
 _PATH_SHARE = 0.2
-# Newton's steps on the plant: each leaves a hundredth or less.
+# Newton steps on the simulated robot; each reduces the error at least a hundredfold.
 _STEPS = 5
 CAMPAIGN = Design(declared=ERRORS_OF_GEOMETRY)
-# Tolerances that a shop floor asks for, evenly on the logarithm: some robots keep them
-# and some do not.
+# Range of tolerances, uniform on a logarithmic scale. Shop floors ask for such
+# tolerances, and only some of the robots meet them.
 _TOLERANCES_M = (1.5e-5, 6e-5)
 _RISK = 0.05
 _REPLICATES = 2000
-# The goal where the effect was named: so many times what the true model leaves.
+# Goal if the effect was named: at most this ratio of the RMS error to that of the
+# simulated robot's own model.
 GOAL = 1.2
 _CASE = ["robot", "effect", "seed"]
-# Verdicts under which one model stands for the robot.
-_SETTLED = ("named", "adequate")
+# Verdicts with a single model of the robot.
+_ONE_MODEL = ("named", "adequate")
 _STATED = ("rms_m", "rms_bound_m", "worst_m", "worst_bound_m", "form_m", "left_out_m")
 
 
@@ -118,9 +121,16 @@ _STATED = ("rms_m", "rms_bound_m", "worst_m", "worst_bound_m", "form_m", "left_o
 class WantedPoses:
     """Poses that a robot shall reach.
 
-    `part` (N,) of str. `position`, `rotation` (N, 3), (N, 3, 3): m, base axes. `wrench`
-    (N, 6). `start` (N, n): joint angles of the rigid robot, as the controller shows
-    them, rad.
+    Attributes
+    ----------
+    part : (N,) array of str
+        Part of the test, of `PARTS`.
+    position, rotation : (N, 3) and (N, 3, 3) arrays
+        Poses of the end effector, m, base axes.
+    wrench : (N, 6) array
+        Load at each pose.
+    start : (N, n) array
+        Reported joint angles of the rigid robot, rad.
     """
 
     part: np.ndarray
@@ -132,242 +142,282 @@ class WantedPoses:
 
 @dataclass(frozen=True)
 class DiagnosedRobot:
-    """A robot with one hidden defect, as its analyst knows it, what was fitted and what
-    was not, and what it shall reach."""
+    """A robot with one hidden effect, after its diagnosis.
+
+    Attributes
+    ----------
+    plant : SimulatedRobot
+        The simulated robot.
+    declared : Robot
+        The robot as the analyst knows it.
+    training, held_out : Case
+        Fitted and held-out measurements.
+    diagnosis : Diagnosis
+        Diagnosis of the fitted measurements.
+    wanted : WantedPoses
+        Poses that the robot shall reach.
+    """
 
     plant: SimulatedRobot
     declared: Robot
     training: Case
     held_out: Case
-    found: Diagnosis
+    diagnosis: Diagnosis
     wanted: WantedPoses
+
+
+class _Commands(NamedTuple):
+    """Commands for the wanted poses.
+
+    Attributes
+    ----------
+    angles : (N, n) array
+        Reported joint angles, rad.
+    predicted_std_m : (N,) array
+        RMS errors that the model states.
+    corrected : (N,) bool array
+        Whether the pose could be corrected.
+    """
+
+    angles: np.ndarray
+    predicted_std_m: np.ndarray
+    corrected: np.ndarray
 
 
 def list_hidden_effects(
     robot_file: str | Path, seed: int, each: int
 ) -> Iterator[tuple[str, int]]:
-    """Hidden effects and seeds of all cases on one robot, `each` of every effect that
-    the loop can be closed with.
+    """List hidden effects and seeds of all cases on one robot, `each` cases per effect.
 
-    These move the robot, need no covariate, such as the approach, which no path states,
-    and can be on this arm.
+    The effects move the robot, are possible on this arm and need no covariate, because
+    a path states none, such as the approach direction.
     """
     arm = build_hidden_robot(robot_file, seed)[0].arm
-    known = catalogue()
+    catalogue = list_effects()
     for effect, kind in sorted(KINDS.items()):
-        moves = (
-            effect in known
-            and known[effect].moves_robot
-            and not kind.needs
-            and kind.locations(arm)
-        )
-        for number in range(each if moves and effect not in ERRORS_OF_GEOMETRY else 0):
-            yield (
-                effect,
-                int(
-                    open_simulation_stream(
-                        seed, f"closed loop {Path(robot_file).stem} {effect} {number}"
-                    ).integers(2**31)
-                ),
-            )
+        if (
+            effect not in catalogue
+            or effect in ERRORS_OF_GEOMETRY
+            or not catalogue[effect].moves_robot
+            or kind.needs
+            or not kind.locations(arm)
+        ):
+            continue
+        for number in range(each):
+            purpose = f"closed loop {Path(robot_file).stem} {effect} {number}"
+            yield effect, int(open_simulation_stream(seed, purpose).integers(2**31))
 
 
 def measure_robot(
-    robot_file: Path, effect: str, seed: int, frame: str = "base", slips: bool = False
+    robot_file: Path,
+    effect: str,
+    seed: int,
+    *,
+    frame: str = "base",
+    slips: bool = False,
 ) -> DiagnosedRobot:
     """Measure and diagnose one robot.
 
-    `effect`: hidden, of plausible size at a joint that is drawn, beside errors of
-    geometry, gears and weights. `slips`: whether the base is a little tilted against
-    where it is declared, and the beam was lost in one fitted row.
+    Parameters
+    ----------
+    robot_file : path
+        Robot file of which the robot is a specimen.
+    effect : str
+        Hidden effect, of plausible size at a joint that is drawn. The robot also has
+        errors of geometry, gears and weights.
+    seed : int
+        Seed of the robot, of its measurements and of its diagnosis.
+    frame : str
+        "base" or "tracker": frame of the measurements.
+    slips : bool
+        Whether the base is slightly tilted against its declaration and the beam was
+        lost in one fitted row.
     """
     plant = build_hidden_robot(robot_file, seed, [effect])[0]
-    design = replace(CAMPAIGN, frame=frame)
-    draws = open_simulation_stream(seed, "lost beam")
     if slips:
         plant = misplace_base(plant, seed)
-    schedule = draw_schedule(plant.arm, design, seed)
-
-    def lost(table: Table) -> tuple[Table, list[Blunder]]:
-        kind = str(draws.choice(["zeros", "held_point"]))
-        fitted = design.poses - design.held_out
-        tries = iter(lambda: add_blunders(table, plant, schedule, kind, 1, draws), None)
-        return next(
-            (bad, slip)
-            for bad, slip in tries
-            if table["pose"][slip[0]["rows"][0]] < fitted
-        )
-
+    design = replace(CAMPAIGN, frame=frame)
+    experiment = Experiment(plant, design, draw_schedule(plant.arm, design, seed))
     with tempfile.TemporaryDirectory() as folder:
-        slipped = lost if slips else None
         write_blind_campaign(
             folder,
             "closed_loop",
             robot_file,
-            plant,
-            design,
-            schedule,
+            experiment,
             plant.arm.masses,
-            slipped,
+            partial(_lose_beam, experiment) if slips else None,
         )
         training, held_out = read_cases(folder, robot_file.parent)
     robot = training.campaign.robot
-    return DiagnosedRobot(
-        plant,
-        robot,
-        training,
-        held_out,
-        diagnose(training, Settings(), seed),
-        draw_wanted_poses(robot, plant, seed),
-    )
+    diagnosis = diagnose(training, Settings(), seed)
+    wanted = draw_wanted_poses(robot, plant, seed)
+    return DiagnosedRobot(plant, robot, training, held_out, diagnosis, wanted)
+
+
+def _lose_beam(experiment: Experiment, table: Table) -> tuple[Table, list[Blunder]]:
+    """Lose the beam of the tracker in one row of the fitted poses."""
+    design = experiment.design
+    schedule = experiment.schedule
+    draws = open_simulation_stream(schedule.seed, "lost beam")
+    kind = str(draws.choice(["zeros", "held_point"]))
+    while True:
+        damaged, slips = add_blunders(table, experiment.robot, schedule, kind, 1, draws)
+        if table["pose"][slips[0]["rows"][0]] < design.poses - design.held_out:
+            return damaged, slips
 
 
 def draw_wanted_poses(robot: Robot, plant: SimulatedRobot, seed: int) -> WantedPoses:
-    """Poses of all parts that a robot shall reach: random ones without and under load,
-    and a path of milling."""
+    """Draw the poses that a robot shall reach: random ones without and under load, and
+    a milling path."""
     draws = open_simulation_stream(seed, "wanted poses")
     low, high = robot.joint_limits.T
-    force = get_typical_force_N(plant.arm)
-    angles = low + (high - low) * (
-        0.5 + _REACH * (draws.random((2 * _POSES, robot.joints)) - 0.5)
-    )
-    shown = robot.reported_angles(angles)
-    direction = draws.standard_normal((_POSES, 3))
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    shares = draws.random((2 * _POSES, robot.joints)) - 0.5
+    angles = robot.reported_angles(low + (high - low) * (0.5 + _RANGE_SHARE * shares))
+    random_poses = (*compute_nominal_poses(robot, angles), angles)
+    load_direction = draws.standard_normal((_POSES, 3))
+    load_direction /= np.linalg.norm(load_direction, axis=1, keepdims=True)
     path = draw_milling_path(robot, _PATH_SHARE * plant.arm.reach_m, _PATH, draws)
-    along = np.gradient(path[0], axis=0)
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
-    # Half against the feed and the rest upwards off the part.
-    process = (
-        force
-        * _MILLING_SHARE
-        * (-np.sqrt(0.5) * along + np.sqrt(0.5) * np.array([0.0, 0.0, 1.0]))
-    )
-    forces = np.concatenate([np.zeros((_POSES, 3)), force * direction, process])
-    random = (*compute_nominal_poses(robot, shown), shown)
-    position, rotation, start = (
-        np.concatenate(both) for both in zip(random, path, strict=True)
-    )
-    part = np.repeat(PARTS, (_POSES, _POSES, _PATH))
+    feed = np.gradient(path[0], axis=0)
+    feed /= np.linalg.norm(feed, axis=1, keepdims=True)
+    # One half of the process force acts against the feed, the other half lifts the tool
+    # off the workpiece.
+    process_direction = -np.sqrt(0.5) * feed + np.sqrt(0.5) * np.array([0.0, 0.0, 1.0])
+    force = get_typical_force_N(plant.arm)
+    forces = [
+        np.zeros((_POSES, 3)),
+        force * load_direction,
+        force * _MILLING_SHARE * process_direction,
+    ]
     return WantedPoses(
-        part, position, rotation, np.pad(forces, ((0, 0), (0, 3))), start
+        np.repeat(PARTS, (_POSES, _POSES, _PATH)),
+        np.concatenate([random_poses[0], path[0]]),
+        np.concatenate([random_poses[1], path[1]]),
+        np.pad(np.concatenate(forces), ((0, 0), (0, 3))),
+        np.concatenate([random_poses[2], path[2]]),
     )
 
 
 def run_closed_loop(
-    robot_file: Path, effect: str, seed: int, slips: bool = False
+    robot_file: Path, effect: str, seed: int, *, slips: bool = False
 ) -> dict[str, np.ndarray]:
-    """One robot, from campaign to corrected targets that were measured; arguments as of
-    `measure`, base declared.
+    """Run the loop for one robot, from its campaign to measurements of its corrected
+    targets.
 
-    Returns one row for each wanted pose and model, columns as `schemas.build_closed_loop_schema` has
-    them.
+    Parameters
+    ----------
+    robot_file, effect, seed, slips
+        As for `measure_robot`; the measurements are in the base frame.
+
+    Returns
+    -------
+    dict
+        One row for each wanted pose and model, with the columns of
+        `schemas.build_closed_loop_schema`.
     """
-    made = measure_robot(robot_file, effect, seed, slips=slips)
-    robot, wanted, count = made.declared, made.wanted, len(made.wanted.part)
-    models = {
-        GEOMETRY: calibrate_by_fit(
-            _geometry(made.training, made.found), replace(robot, masses=())
-        ),
-        DECLARED: calibrate_by_fit(made.found.declared, robot),
-        DIAGNOSED: _corrected(made, seed),
+    robot = measure_robot(robot_file, effect, seed, slips=slips)
+    diagnosis = robot.diagnosis
+    wanted = robot.wanted
+    count = len(wanted.part)
+    rigid = replace(robot.declared, masses=())
+    geometry = calibrate_by_fit(_fit_geometry(robot.training, diagnosis), rigid)
+    declared = calibrate_by_fit(diagnosis.declared, robot.declared)
+    commands = {
+        UNCORRECTED: _Commands(wanted.start, np.zeros(count), np.ones(count, bool)),
+        GEOMETRY: _correct(geometry, wanted),
+        DECLARED: _correct(declared, wanted),
+        DIAGNOSED: _correct(_calibrate(robot, seed), wanted),
+        PLANT: _correct_by_plant(robot, seed),
     }
-    # Commands, the errors that a model states, and whether a pose could be corrected.
-    commanded = {UNCORRECTED: (wanted.start, np.zeros(count), np.ones(count, bool))}
-    for name, model in models.items():
-        targets = find_joint_targets(
-            model, wanted.position, wanted.rotation, wanted.wrench, wanted.start
-        )
-        stated = predict_errors(
-            model, targets.joint_angles, wanted.wrench, draws=0
-        ).error_m
-        commanded[name] = targets.joint_angles, stated, targets.status == OK
-    commanded[PLANT] = _by_plant(made, seed)
-    rows = [
-        _moved(made, commands, seed)
-        | {"model": name, "predicted_std_m": stated, "corrected": good}
-        for name, (commands, stated, good) in commanded.items()
-    ]
-    named = effect in {
-        entry["name"] for entry in made.found.document["effects"] if entry["adopted"]
-    }
-    head = {
+    verdict = diagnosis.verdict
+    case: dict[str, Any] = {
         "effect": effect,
         "seed": seed,
-        "verdict": made.found.document["verdict"],
-        "named": named,
+        "verdict": verdict.verdict,
+        "named": any(
+            entry.name == effect and entry.adopted for entry in verdict.effects
+        ),
     }
-    return {
-        name: np.concatenate(
-            [np.broadcast_to((head | row)[name], count) for row in rows]
-        )
-        for name in (*head, *rows[0])
-    }
+    rows = [
+        case
+        | _measure_again(robot, model_commands.angles, seed)
+        | {
+            "model": model,
+            "predicted_std_m": model_commands.predicted_std_m,
+            "corrected": model_commands.corrected,
+        }
+        for model, model_commands in commands.items()
+    ]
+    columns = {}
+    for name in rows[0]:
+        values = [np.broadcast_to(row[name], count) for row in rows]
+        columns[name] = np.concatenate(values)
+    return columns
 
 
-def _corrected(made: DiagnosedRobot, seed: int) -> CalibratedRobot:
-    """The robot as the diagnosis corrects it."""
-    part = remove_gross_errors(made.found, made.held_out)[1]
-    return build_calibrated_robot(
-        made.found, part, apply_regression(made.found, part, seed)
-    )
+def _calibrate(robot: DiagnosedRobot, seed: int) -> CalibratedRobot:
+    """Return the robot as its diagnosis corrects it."""
+    diagnosis = robot.diagnosis
+    held_out = remove_gross_errors(diagnosis, robot.held_out)[1]
+    delivered = apply_regression(diagnosis, held_out, seed)
+    return build_calibrated_robot(diagnosis, held_out, delivered)
 
 
-def _geometry(case: Case, found: Diagnosis) -> Fit:
-    """A calibration of the geometry alone: a rigid arm, fitted to where no load acts
-    but its weight."""
+def _fit_geometry(case: Case, diagnosis: Diagnosis) -> Fit:
+    """Calibrate the geometry alone: fit a rigid arm to the measurements without a load
+    other than its weight."""
     campaign = case.campaign
-    rigid = replace(
-        campaign.robot, masses=(), compliance=np.zeros(campaign.robot.joints)
-    )
+    robot = campaign.robot
+    rigid = replace(robot, masses=(), compliance=np.zeros(robot.joints))
     bare = build_declared_model(replace(campaign, robot=rigid, compliance="nominal"))
     model = bare.with_effects(
         declared_candidates(campaign.declared, bare.sites, "closed loop")
     )
     unloaded = np.asarray(~case.observations.states.wrench.any(axis=1))
     return fit_declared_model(
-        model, select_states(case.observations, unloaded), found.declared.noise
+        model, select_states(case.observations, unloaded), diagnosis.declared.noise
     )
 
 
-def _by_plant(
-    made: DiagnosedRobot, seed: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Commands by Newton's method on the plant without its chance, which states no
-    error, and whether they succeed."""
-    robot = made.declared
-    wanted = made.wanted
-    certain = replace(made.plant, repeatability_rad=())
-    commands = wanted.start.copy()
+def _correct(model: CalibratedRobot, wanted: WantedPoses) -> _Commands:
+    """Correct the commands by a model."""
+    targets = find_joint_targets(
+        model, wanted.position, wanted.rotation, wanted.wrench, wanted.start
+    )
+    prediction = predict_errors(model, targets.joint_angles, wanted.wrench, draws=0)
+    return _Commands(targets.joint_angles, prediction.error_m, targets.status == OK)
+
+
+def _correct_by_plant(robot: DiagnosedRobot, seed: int) -> _Commands:
+    """Correct the commands by Newton's method on the simulated robot without its random
+    errors; it states no error."""
+    declared = robot.declared
+    wanted = robot.wanted
+    deterministic = replace(robot.plant, repeatability_rad=())
+    angles = wanted.start.copy()
     inverse = np.linalg.pinv(
         compute_jacobians(
-            robot.chain, robot.model_angles(commands), robot.chain.end_effector
+            declared.chain, declared.model_angles(angles), declared.chain.end_effector
         )
     )
 
-    def off() -> np.ndarray:
-        return compute_pose_differences(
-            wanted.position,
-            wanted.rotation,
-            *move_robot(certain, commands, wanted.wrench, seed),
-        )
+    def compute_pose_errors() -> np.ndarray:
+        poses = move_robot(deterministic, angles, wanted.wrench, seed)
+        return compute_pose_differences(wanted.position, wanted.rotation, *poses)
 
     for _ in range(_STEPS):
-        commands = robot.reported_angles(
-            robot.model_angles(commands) + (inverse @ off()[..., None])[..., 0]
-        )
-    return (
-        commands,
-        np.zeros(len(commands)),
-        np.linalg.norm(off()[:, :3], axis=1) < 1e-6,
-    )
+        steps = (inverse @ compute_pose_errors()[..., None])[..., 0]
+        angles = declared.reported_angles(declared.model_angles(angles) + steps)
+    remaining_m = np.linalg.norm(compute_pose_errors()[:, :3], axis=1)
+    return _Commands(angles, np.zeros(len(angles)), remaining_m < 1e-6)
 
 
-def _moved(made: DiagnosedRobot, commands: np.ndarray, seed: int) -> dict[str, Any]:
-    """What the robot does with its commands, with chance of its own."""
-    wanted = made.wanted
-    position, rotation = move_robot(made.plant, commands, wanted.wrench, seed + 1)
-    read, _ = made.plant.tracker.read(
+def _measure_again(
+    robot: DiagnosedRobot, angles: np.ndarray, seed: int
+) -> dict[str, Any]:
+    """Command the robot, with new random errors, and measure it."""
+    wanted = robot.wanted
+    position, rotation = move_robot(robot.plant, angles, wanted.wrench, seed + 1)
+    measured, _ = robot.plant.tracker.read(
         position[:, None],
         rotation[:, None],
         open_simulation_stream(seed, "measured again"),
@@ -375,62 +425,52 @@ def _moved(made: DiagnosedRobot, commands: np.ndarray, seed: int) -> dict[str, A
     return {
         "part": wanted.part,
         "pose": np.arange(len(wanted.part)),
-        **{f"q{joint}": column for joint, column in enumerate(commands.T, 1)},
+        **{f"q{joint}": column for joint, column in enumerate(angles.T, 1)},
         "reached_error_m": np.linalg.norm(position - wanted.position, axis=1),
-        "measured_error_m": np.linalg.norm(read[:, 0] - wanted.position, axis=1),
+        "measured_error_m": np.linalg.norm(measured[:, 0] - wanted.position, axis=1),
     }
 
 
 def compare_stated_accuracy(
     robot_file: Path, effect: str, seed: int, frame: str
 ) -> list[dict[str, Any]]:
-    """For each of `STATED_OF` what is predicted, bounded and decided of one corrected
-    robot's error, and what the plant's is.
+    """Compare the stated accuracy of one corrected robot with its true errors.
 
-    In the base's frame where the campaign knew it, else after the best rigid placement
-    over the random poses.
+    Parameters
+    ----------
+    robot_file, effect, seed, frame
+        As for `measure_robot`. If the campaign did not know the base frame, errors are
+        counted after the best rigid placement over the random poses.
+
+    Returns
+    -------
+    list of dict
+        For each of `STATED_PARTS` the predicted error, its bounds, the decision about
+        a tolerance, and the true error.
     """
-    made = measure_robot(robot_file, effect, seed, frame)
-    plant = made.plant
-    wanted = made.wanted
-    calibrated = _corrected(made, seed)
-    targets = find_joint_targets(
+    robot = measure_robot(robot_file, effect, seed, frame=frame)
+    wanted = robot.wanted
+    calibrated = _calibrate(robot, seed)
+    commands = find_joint_targets(
         calibrated, wanted.position, wanted.rotation, wanted.wrench, wanted.start
     )
-    good = targets.status == OK
-    off = (
-        move_robot(plant, targets.joint_angles, wanted.wrench, seed + 1)[0]
-        - wanted.position
-    )
+    angles = commands.joint_angles
+    corrected = commands.status == OK
+    errors = move_robot(robot.plant, angles, wanted.wrench, seed + 1)[0]
+    errors = errors - wanted.position
     if frame != "base":
-        over = good & (wanted.part != MILLING)
-        columns = compute_placement_columns(
-            Scope(ROBOT, wanted.position[over].mean(axis=0)),
-            wanted.position,
-            wanted.rotation,
-        )
-        field = np.concatenate([off, np.zeros_like(off)], axis=1)[..., None]
-        off = (
-            field
-            - columns
-            @ fit_placement(
-                columns[over], field[over], np.repeat([True, True, False, False], 3)
-            )
-        )[:, :3, 0]
-    tolerance = float(
-        np.exp(
-            open_simulation_stream(seed, "tolerance").uniform(*np.log(_TOLERANCES_M))
-        )
+        random_poses = corrected & (wanted.part != MILLING)
+        errors = _subtract_placement(wanted, errors, random_poses)
+    tolerance_m = np.exp(
+        open_simulation_stream(seed, "tolerance").uniform(*np.log(_TOLERANCES_M))
     )
     rows = []
-    for part, members in STATED_PARTS.items():
-        mine = good & np.isin(wanted.part, members)
-        prediction = predict_errors(
-            calibrated, targets.joint_angles[mine], wanted.wrench[mine]
-        )
-        stated = prediction.summarize(part)
-        distance = np.linalg.norm(off[mine], axis=1)
-        decided = decide_conformity(prediction.rms_m, tolerance, _RISK)
+    for part in STATED_PARTS:
+        chosen = corrected & np.isin(wanted.part, STATED_PARTS[part])
+        prediction = predict_errors(calibrated, angles[chosen], wanted.wrench[chosen])
+        accuracy = prediction.summarize(part)
+        distance = np.linalg.norm(errors[chosen], axis=1)
+        conformity = decide_conformity(prediction.rms_m, float(tolerance_m), _RISK)
         rows.append(
             {
                 "robot": robot_file.stem,
@@ -438,37 +478,50 @@ def compare_stated_accuracy(
                 "seed": seed,
                 "frame": frame,
                 "part": part,
-            }
-            | {"verdict": made.found.document["verdict"], "poses": stated.poses}
-            | {name: getattr(stated, name) for name in _STATED}
-            | {
+                "verdict": robot.diagnosis.verdict.verdict,
+                "poses": accuracy.poses,
+                **{name: getattr(accuracy, name) for name in _STATED},
                 "true_rms_m": float(np.sqrt((distance**2).mean())),
                 "true_worst_m": float(distance.max()),
+                "tolerance_m": float(tolerance_m),
+                "decision": conformity.decision,
             }
-            | {"tolerance_m": tolerance, "decision": decided.decision}
         )
     return rows
 
 
+def _subtract_placement(
+    wanted: WantedPoses, errors: np.ndarray, fitted: np.ndarray
+) -> np.ndarray:
+    """Subtract the base placement that fits the position errors (N, 3) of some poses
+    best, `fitted` (N,) bool, from the errors of all poses."""
+    scope = Scope(ROBOT, wanted.position[fitted].mean(axis=0))
+    columns = compute_placement_columns(scope, wanted.position, wanted.rotation)
+    field = np.concatenate([errors, np.zeros_like(errors)], axis=1)[..., None]
+    free = select_free_parameters(base=True, offset=False)
+    placement = fit_placement(columns[fitted], field[fitted], free)
+    residual: np.ndarray = (field - columns @ placement)[:, :3, 0]
+    return residual
+
+
 def close_loop(job: Any) -> None:
-    """All cases of the closed loop on one robot, as one table."""
+    """Run all cases of the closed loop on one robot, into one table."""
     robot = Path(job.input.robot)
-    asked = job.params
+    params = job.params
     blocks = (
-        run_closed_loop(robot, *case, slips=asked.slips)
-        for case in list_hidden_effects(robot, asked.seed, asked.each)
+        run_closed_loop(robot, *case, slips=params.slips)
+        for case in list_hidden_effects(robot, params.seed, params.each)
     )
     write_table(
         job.output.moved,
         schemas.build_closed_loop_schema(read_robot(robot).joints),
         blocks,
-        describe_provenance(asked, **job.wildcards),
+        describe_provenance(params, **job.wildcards),
     )
 
 
 def state_accuracy(job: Any) -> None:
-    """What is stated of the accuracy of each robot of the closed loop, beside the
-    truth."""
+    """Compare stated with true accuracies for all cases on one robot."""
     robot = Path(job.input.robot)
     frame = job.wildcards.frame
     rows = [
@@ -480,26 +533,32 @@ def state_accuracy(job: Any) -> None:
 
 
 def compute_case_errors(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """RMS errors of each case and part, of rows of `closed_loop` by robot.
+    """Compute the RMS errors of each case and part.
 
-    Columns: the measured RMS of each model (m), the same as the robot reached it,
-    without the tracker's noise (``.._reached``), that of the model found over that of
-    the true one (``over_floor``), and ``calibration``: mean square error reached over
-    mean square predicted. Poses that some model could not correct are left out for all.
+    Poses that some model could not correct are left out for all models.
+
+    Parameters
+    ----------
+    tables : mapping
+        Rows of `run_closed_loop`, by robot.
+
+    Returns
+    -------
+    DataFrame
+        Measured RMS error of each model (m); the same as the robot reached it, without
+        the tracker's noise (``.._reached``); ``over_floor``, the error of the diagnosed
+        model over that of the simulated robot's own; and ``calibration``, mean square
+        error reached over mean square predicted.
     """
     frame = pd.concat(
         [table.assign(robot=robot) for robot, table in tables.items()],
         ignore_index=True,
     )
-    frame = frame[frame.groupby([*_CASE, "part", "pose"])["corrected"].transform("all")]
-    key = [*_CASE, "verdict", "named", "part", "model"]
+    pose = frame.groupby([*_CASE, "part", "pose"])
+    frame = frame[pose["corrected"].transform("all")]
     columns = ["measured_error_m", "reached_error_m", "predicted_std_m"]
-    means = (
-        (frame[columns] ** 2)
-        .groupby([frame[name] for name in key])
-        .mean()
-        .unstack("model")
-    )
+    keys = [frame[name] for name in (*_CASE, "verdict", "named", "part", "model")]
+    means = (frame[columns] ** 2).groupby(keys).mean().unstack("model")
     measured, reached, predicted = (means[name] for name in columns)
     errors = np.sqrt(measured[[*MODELS]]).join(
         np.sqrt(reached[[*MODELS]]).add_suffix("_reached")
@@ -512,167 +571,177 @@ def compute_case_errors(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
 
 
 def summarize_errors(errors: pd.DataFrame, seed: int) -> pd.DataFrame:
-    """`case_errors` together, with 95 % limits by a bootstrap over cases: one row for
-    each robot (and "all"), part and model.
+    """Summarize `compute_case_errors`, with 95 % limits by a bootstrap over cases.
 
-    ``reached_mm`` is without the tracker's noise.
+    Returns one row for each robot (and "all"), part and model; ``reached_mm`` is
+    without the tracker's noise.
     """
     rows = []
-    for robot in (*dict.fromkeys(errors["robot"]), "all"):
-        for part in PARTS:
-            mine = errors[
-                (errors["part"] == part)
-                & ((errors["robot"] == robot) | (robot == "all"))
-            ]
-            draws = analysis_stream(seed, robot, f"closed loop {part}", 0).integers(
-                len(mine), size=(_REPLICATES, len(mine))
+    for robot, part in product((*dict.fromkeys(errors["robot"]), "all"), PARTS):
+        of_robot = (errors["robot"] == robot) | (robot == "all")
+        selected = errors[(errors["part"] == part) & of_robot]
+        cases = len(selected)
+        draws = open_stream(seed, robot, f"closed loop {part}", 0).integers(
+            cases, size=(_REPLICATES, cases)
+        )
+        floor, floor_replicates = _bootstrap_rms(selected[PLANT], draws)
+        for model in MODELS:
+            rms, replicates = _bootstrap_rms(selected[model], draws)
+            reached, reached_replicates = _bootstrap_rms(
+                selected[f"{model}_reached"], draws
             )
-
-            def drawn(
-                name: str, mine: pd.DataFrame = mine, draws: np.ndarray = draws
-            ) -> tuple[float, np.ndarray]:
-                squares = mine[name].to_numpy() ** 2
-                return float(np.sqrt(squares.mean())), np.sqrt(
-                    squares[draws].mean(axis=1)
-                )
-
-            floor = drawn(PLANT)
-            for model in MODELS:
-                (rms, many), (reached, many_reached) = (
-                    drawn(model),
-                    drawn(f"{model}_reached"),
-                )
-                row = {"robot": robot, "part": part, "model": model, "cases": len(mine)}
-                row |= _with_limits("rms_mm", 1e3 * rms, 1e3 * many)
-                row |= _with_limits("over_floor", rms / floor[0], many / floor[1])
-                rows.append(
-                    row | _with_limits("reached_mm", 1e3 * reached, 1e3 * many_reached)
-                )
+            ratios = replicates / floor_replicates
+            rows.append(
+                {"robot": robot, "part": part, "model": model, "cases": cases}
+                | _limit("rms_mm", 1e3 * rms, 1e3 * replicates)
+                | _limit("over_floor", rms / floor, ratios)
+                | _limit("reached_mm", 1e3 * reached, 1e3 * reached_replicates)
+            )
     return pd.DataFrame(rows)
 
 
+def _bootstrap_rms(values: pd.Series, draws: np.ndarray) -> tuple[float, np.ndarray]:
+    """Compute the root mean square of values (N,), and of their resamples by `draws`
+    (R, N)."""
+    squares = values.to_numpy() ** 2
+    return float(np.sqrt(squares.mean())), np.sqrt(squares[draws].mean(axis=1))
+
+
+def _limit(name: str, value: float, replicates: np.ndarray) -> dict[str, float]:
+    """Describe a value with its 95 % percentile interval."""
+    low, high = np.quantile(replicates, [0.025, 0.975])
+    return {name: float(value), f"{name}_low": float(low), f"{name}_high": float(high)}
+
+
 def count_cases_within_goal(errors: pd.DataFrame) -> pd.DataFrame:
-    """How many of `case_errors` are within `GOAL` of the floor, by part, where the
-    effect was named and where not.
+    """Count the cases of `compute_case_errors` within `GOAL` of the floor, by part and
+    by whether the effect was named.
 
-    Shares with 95 % limits [1]; medians of ``over_floor`` and of ``calibration``.
+    Shares have 95 % limits [1]_; there are also the medians of ``over_floor`` and of
+    ``calibration``.
 
-    [1] Wilson, E. B., Probable inference, the law of succession, and statistical inference, Journal of the American Statistical
-        Association 22, 1927.
+    References
+    ----------
+    .. [1] Wilson, E. B., Probable inference, the law of succession, and statistical
+       inference, Journal of the American Statistical Association 22, 1927.
     """
     rows = []
-    for part in PARTS:
-        for named in (True, False):
-            mine = errors[(errors["part"] == part) & (errors["named"] == named)]
-            if len(mine):
-                within = int((mine["over_floor"] <= GOAL).sum())
-                low, high = proportion_confint(within, len(mine), method="wilson")
-                rows.append(
-                    {"part": part, "named": named, "cases": len(mine), "within": within}
-                    | {
-                        "share": within / len(mine),
-                        "share_low": low,
-                        "share_high": high,
-                    }
-                    | {
-                        f"median_{name}": mine[name].median()
-                        for name in ("over_floor", "calibration")
-                    }
-                )
+    for part, named in product(PARTS, (True, False)):
+        selected = errors[(errors["part"] == part) & (errors["named"] == named)]
+        cases = len(selected)
+        if not cases:
+            continue
+        within = int((selected["over_floor"] <= GOAL).sum())
+        low, high = proportion_confint(within, cases, method="wilson")
+        rows.append(
+            {
+                "part": part,
+                "named": named,
+                "cases": cases,
+                "within": within,
+                "share": within / cases,
+                "share_low": low,
+                "share_high": high,
+                "median_over_floor": selected["over_floor"].median(),
+                "median_calibration": selected["calibration"].median(),
+            }
+        )
     return pd.DataFrame(rows)
 
 
 def compute_coverage(rows: pd.DataFrame) -> pd.DataFrame:
-    """How often the truth is below the bounds of `stated_accuracy`, and denies a
-    decision, with Clopper-Pearson intervals.
+    """Count how often the true error is below its stated bound, and how often it
+    contradicts a decision.
 
-    One row for each frame (and all), part, kind of verdict (and all) and question, with
-    the root of mean true over mean predicted squares.
+    Parameters
+    ----------
+    rows : DataFrame
+        Rows of `compare_stated_accuracy`.
+
+    Returns
+    -------
+    DataFrame
+        One row for each frame (and all), part, kind of verdict (and all) and question,
+        with Clopper-Pearson intervals and the root of the ratio of mean true to mean
+        predicted squares.
     """
-    settled = rows["verdict"].isin(_SETTLED)
-    always = rows["verdict"].notna()
+    one_model = rows["verdict"].isin(_ONE_MODEL)
+    all_rows = rows["verdict"].notna()
+    within = rows["true_rms_m"] <= rows["tolerance_m"]
+    verdicts = {
+        "one model": one_model,
+        "several, class, unexplained": ~one_model,
+        "all": all_rows,
+    }
+    # The rows that each question concerns, and those that count as hits.
     questions = {
-        "rms below its 95 % bound": (always, rows["true_rms_m"] <= rows["rms_bound_m"]),
+        "rms below its 95 % bound": (
+            all_rows,
+            rows["true_rms_m"] <= rows["rms_bound_m"],
+        ),
         "worst below its 95 % bound": (
-            always,
+            all_rows,
             rows["true_worst_m"] <= rows["worst_bound_m"],
         ),
-        "pass that the truth denies": (
-            rows["decision"] == "pass",
-            rows["true_rms_m"] > rows["tolerance_m"],
-        ),
-        "fail that the truth denies": (
-            rows["decision"] == "fail",
-            rows["true_rms_m"] <= rows["tolerance_m"],
-        ),
+        "pass that the truth denies": (rows["decision"] == "pass", ~within),
+        "fail that the truth denies": (rows["decision"] == "fail", within),
     }
-    found = []
-    for frame in ("base", "tracker", "all"):
-        for part in STATED_PARTS:
-            for verdict, chosen in (
-                ("one model", settled),
-                ("several, class, unexplained", ~settled),
-                ("all", always),
-            ):
-                mine = (
-                    chosen
-                    & (rows["part"] == part)
-                    & ((rows["frame"] == frame) | (frame == "all"))
-                )
-                squares = [
-                    (rows.loc[mine, name] ** 2).mean()
-                    for name in ("true_rms_m", "rms_m")
-                ]
-                for question, (asked, hit) in questions.items():
-                    cases = int((mine & asked).sum())
-                    hits = int((mine & asked & hit).sum())
-                    low, high = (
-                        proportion_confint(hits, cases, method="beta")
-                        if cases
-                        else (0.0, 1.0)
-                    )
-                    found.append(
-                        {
-                            "frame": frame,
-                            "part": part,
-                            "verdict": verdict,
-                            "question": question,
-                            "cases": cases,
-                            "hits": hits,
-                        }
-                        | {"share": hits / max(cases, 1), "low": low, "high": high}
-                        | {
-                            "true_over_predicted": float(
-                                np.sqrt(squares[0] / squares[1])
-                            )
-                        }
-                    )
-    return pd.DataFrame(found)
+    counts = []
+    for frame, part, verdict in product(
+        ("base", "tracker", "all"), STATED_PARTS, verdicts
+    ):
+        of_frame = (rows["frame"] == frame) | (frame == "all")
+        selected = verdicts[verdict] & (rows["part"] == part) & of_frame
+        squares = rows.loc[selected, ["true_rms_m", "rms_m"]] ** 2
+        ratio = np.sqrt(squares["true_rms_m"].mean() / squares["rms_m"].mean())
+        for question, (concerned, hits) in questions.items():
+            counts.append(
+                {
+                    "frame": frame,
+                    "part": part,
+                    "verdict": verdict,
+                    "question": question,
+                    **_count_hits(hits[selected & concerned]),
+                    "true_over_predicted": float(ratio),
+                }
+            )
+    return pd.DataFrame(counts)
 
 
-def _with_limits(name: str, value: float, drawn: np.ndarray) -> dict[str, float]:
-    low, high = np.quantile(drawn, [0.025, 0.975])
-    return {name: float(value), f"{name}_low": float(low), f"{name}_high": float(high)}
+def _count_hits(hits: pd.Series) -> dict[str, float]:
+    """Count hits among cases, with the Clopper-Pearson interval of their share."""
+    cases = len(hits)
+    count = int(hits.sum())
+    low = 0.0
+    high = 1.0
+    if cases:
+        low, high = proportion_confint(count, cases, method="beta")
+    return {
+        "cases": cases,
+        "hits": count,
+        "share": count / max(cases, 1),
+        "low": low,
+        "high": high,
+    }
 
 
 def summarize_closed_loop(job: Any) -> None:
-    """Errors of the closed loop: by case, and together with intervals."""
-    joints = [read_robot(Path(robot)).joints for robot in job.input.robots]
-    files = zip(job.params.robots, job.input.moved, joints, strict=True)
-    errors = compute_case_errors(
-        {
-            robot: read_frame(path, schemas.build_closed_loop_schema(count))
-            for robot, path, count in files
-        }
-    )
+    """Tabulate the errors of the closed loop by case, and together with intervals."""
+    tables = {}
+    for robot, table_path, robot_file in zip(
+        job.params.robots, job.input.moved, job.input.robots, strict=True
+    ):
+        joints = read_robot(Path(robot_file)).joints
+        schema = schemas.build_closed_loop_schema(joints)
+        tables[robot] = read_frame(table_path, schema)
+    errors = compute_case_errors(tables)
     write_csv(job.output.errors, errors)
     write_csv(job.output.summary, summarize_errors(errors, job.params.seed))
     write_csv(job.output.goals, count_cases_within_goal(errors))
 
 
 def tabulate_coverage(job: Any) -> None:
-    """How often stated accuracies hold: all cases, and their coverage with
-    intervals."""
+    """Tabulate stated and true accuracies of all cases, and their coverage."""
     rows = pd.concat(
         [pd.read_csv(path) for path in job.input.stated], ignore_index=True
     )

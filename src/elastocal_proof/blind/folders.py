@@ -1,5 +1,8 @@
-"""The analyst's folder, and the sealed ground truth outside of it. A campaign's format
-is a contract of both sides."""
+"""The analyst's folder of a blind case, and its sealed ground truth, which lies outside
+of that folder.
+
+The format of a campaign is a contract of both sides.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ import hashlib
 import json
 import platform
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,31 +31,44 @@ from elastocal_proof.plant.campaigns import (
 )
 from elastocal_proof.plant.simulated_robot import Schedule, SimulatedRobot
 
+# Damages some rows of a table of measurements, and says which.
 DamageRows = Callable[[Table], tuple[Table, list[Blunder]]]
 
 ROBOT_FILE = "robot.yaml"
 
 
+@dataclass(frozen=True)
+class Experiment:
+    """A simulated robot, the design of its campaign and the schedule of that design."""
+
+    robot: SimulatedRobot
+    design: Design
+    schedule: Schedule
+
+
 def build_campaign_document(name: str, arm: Arm, design: Design) -> dict[str, Any]:
-    """Contents of campaign.yaml; nothing in it depends on the defects."""
+    """Build the contents of campaign.yaml, which do not depend on the defects."""
+    targets = {
+        f"{point}": {"point": point, "offset_m": [0, 0, 0]}
+        for point in design.points or arm.points
+    }
     document = {
         "campaign": name,
         "robot": ROBOT_FILE,
         "measured": design.measured,
         "frame": design.frame,
-        "targets": {
-            f"{point}": {"point": point, "offset_m": [0, 0, 0]}
-            for point in design.points or arm.points
-        },
+        "targets": targets,
         "compliance": "identify",
         "declared": list(design.declared),
         "holdout": {"poses": list(range(design.poses - design.held_out, design.poses))},
         "remainder": "none",
     }
     if design.declared_noise is not None:
-        document["noise"] = dict(
-            zip(("position_m", "orientation_rad"), design.declared_noise, strict=True)
-        )
+        position_m, orientation_rad = design.declared_noise
+        document["noise"] = {
+            "position_m": position_m,
+            "orientation_rad": orientation_rad,
+        }
     return document
 
 
@@ -60,33 +76,45 @@ def write_blind_campaign(
     folder: str | Path,
     name: str,
     robot_file: str | Path,
-    robot: SimulatedRobot,
-    design: Design,
-    schedule: Schedule,
+    experiment: Experiment,
     declared: Sequence[LinkMass] = (),
-    slipped: DamageRows | None = None,
+    damage_rows: DamageRows | None = None,
 ) -> dict[str, Any]:
-    """Measure, and write what the analyst gets; returns how the data were made, for the
-    ground truth of the case.
+    """Simulate the measurements and write the analyst's folder.
 
-    `folder`: the campaign's own. `name`: of the campaign; must not give the ground
-    truth away. `robot_file`: of which the robot is a specimen. `declared`: weights as
-    they are declared to the analyst. `slipped`: what goes wrong in the file.
+    Parameters
+    ----------
+    folder : path
+        Folder of the campaign.
+    name : str
+        Name of the campaign, which must not reveal the ground truth.
+    robot_file : path
+        Robot file of which the robot is a specimen.
+    experiment : Experiment
+        What is simulated.
+    declared : sequence of LinkMass
+        Weights as they are declared to the analyst.
+    damage_rows : callable, optional
+        Damages some rows of the table before it is written.
+
+    Returns
+    -------
+    dict
+        How the data were made, for the ground truth of the case.
     """
-    table = simulate_measurements(robot, design, schedule)
-    table, slips = slipped(table) if slipped else (table, [])
-    write_campaign(
-        folder,
-        build_campaign_document(name, robot.arm, design),
-        table,
-        robot.arm.joints,
-        "parquet",
-    )
+    robot = experiment.robot
+    design = experiment.design
+    table = simulate_measurements(robot, design, experiment.schedule)
+    slips = None
+    if damage_rows is not None:
+        table, slips = damage_rows(table)
+    document = build_campaign_document(name, robot.arm, design)
+    write_campaign(folder, document, table, robot.arm.joints, "parquet")
     write_robot_file(folder, robot_file, robot, declared, design.undeclared)
-    return {
+    record = {
         "campaign": name,
         "robot": Path(robot_file).stem,
-        "seed": schedule.seed,
+        "seed": experiment.schedule.seed,
         "design": asdict(design),
         "compliance_urad_per_Nm": (1e6 * robot.compliance).tolist(),
         "masses": [asdict(mass) for mass in robot.structure.masses],
@@ -101,7 +129,10 @@ def write_blind_campaign(
             "numpy": np.__version__,
             "python": platform.python_version(),
         },
-    } | ({"bad_rows": slips} if slipped else {})
+    }
+    if slips is not None:
+        record["bad_rows"] = slips
+    return record
 
 
 def write_robot_file(
@@ -111,8 +142,22 @@ def write_robot_file(
     declared: Sequence[LinkMass],
     undeclared: Sequence[str] = (),
 ) -> None:
-    """Write the campaign's own robot file: without masses where none are declared, and
-    without the keys that are undeclared."""
+    """Write the robot file of a campaign.
+
+    Parameters
+    ----------
+    folder : path
+        Folder of the campaign.
+    robot_file : path
+        Robot file of which the robot is a specimen.
+    robot : SimulatedRobot
+        The robot.
+    declared : sequence of LinkMass
+        Weights as they are declared to the analyst; without any, the file has no
+        ``masses``.
+    undeclared : sequence of str
+        Keys that the file lacks.
+    """
     arm = robot.arm
     nominal = yaml.safe_load(Path(robot_file).read_text(encoding="utf-8"))
     absent = ("masses", "gravity_m_s2", "compensator", "payload_kg", *undeclared)
@@ -120,22 +165,19 @@ def write_robot_file(
     if declared:
         document["masses"] = [
             {
-                "link": m.link,
-                "mass_kg": m.mass_kg,
-                "centre_m": [*m.centre_m],
-                "relative_std": m.relative_std,
+                "link": mass.link,
+                "mass_kg": mass.mass_kg,
+                "centre_m": [*mass.centre_m],
+                "relative_std": mass.relative_std,
             }
-            for m in declared
+            for mass in declared
         ]
-    document |= {
-        "gravity_m_s2": list(robot.structure.gravity_m_s2),
-        "payload_kg": round(arm.payload_kg, 1),
-    }
+    document["gravity_m_s2"] = list(robot.structure.gravity_m_s2)
+    document["payload_kg"] = round(arm.payload_kg, 1)
     document["gear_ratio"] = list(arm.gear_ratio)
     if arm.compensated:
-        document["compensator"] = nominal.get(
-            "compensator", {"joint": 2, "kind": "spring"}
-        )
+        usual_compensator = {"joint": 2, "kind": "spring"}
+        document["compensator"] = nominal.get("compensator", usual_compensator)
     write_text(
         Path(folder) / ROBOT_FILE,
         yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120),
@@ -145,10 +187,17 @@ def write_robot_file(
 def write_truth(
     path: str | Path, truth: Mapping[str, Any], campaign_folder: str | Path
 ) -> str:
-    """Seal the ground truth of a case as sorted JSON; returns its SHA-256, to be
-    published before any diagnosis.
+    """Write the ground truth of a case as sorted JSON.
 
-    Raises `ValueError`: the file would lie in the campaign's folder.
+    Returns
+    -------
+    str
+        Its SHA-256, which is published before any diagnosis.
+
+    Raises
+    ------
+    ValueError
+        If the file would lie in the campaign's folder.
     """
     path = Path(path)
     folder = Path(campaign_folder)
@@ -163,11 +212,11 @@ def write_truth(
 
 
 def seal_cases(job: Any) -> None:
-    """The commitment that is published before any diagnosis: a line ``sha256  name`` for each ground truth."""
-    files = sorted(_sealed_in(job.input.sealed), key=lambda file: file.name)
+    """Write the commitment that is published before any diagnosis: a line ``sha256
+    name`` for each ground truth."""
     lines = [
-        f"{hashlib.sha256(file.read_bytes()).hexdigest()}  {file.name}\n"
-        for file in files
+        f"{_hash_file(file)}  {file.name}\n"
+        for file in _list_sealed_files(job.input.sealed)
     ]
     write_text(job.output.manifest, "".join(lines))
 
@@ -175,23 +224,45 @@ def seal_cases(job: Any) -> None:
 def load_ground_truth(
     folders: Iterable[str | Path], manifest: str | Path
 ) -> dict[str, dict[str, Any]]:
-    """Sealed documents by the name of the case, in its order, for the scores and the
-    oracle only.
+    """Load the sealed documents, for the scores and the oracle only.
 
-    Raises `InputError`: a file is not the one whose hash was published.
+    Parameters
+    ----------
+    folders : iterable of path
+        Folders of sealed documents.
+    manifest : path
+        Published hashes, as `seal_cases` writes them.
+
+    Returns
+    -------
+    dict
+        Documents by the name of the case, in the order of these names.
+
+    Raises
+    ------
+    InputError
+        If the hash of a file is not the published one.
     """
-    lines = Path(manifest).read_text(encoding="utf-8").splitlines()
-    published = {name: digest for digest, name in map(str.split, lines)}
+    published = {}
+    for line in Path(manifest).read_text(encoding="utf-8").splitlines():
+        digest, name = line.split()
+        published[name] = digest
     truths = {}
-    for file in sorted(_sealed_in(folders), key=lambda file: file.name):
-        found = hashlib.sha256(file.read_bytes()).hexdigest()
-        if published.get(file.name) != found:
+    for file in _list_sealed_files(folders):
+        digest = _hash_file(file)
+        if published.get(file.name) != digest:
             raise InputError(
-                file, "", f"SHA-256 {found}", f"{published.get(file.name)}, as sealed"
+                file, "", f"SHA-256 {digest}", f"{published.get(file.name)}, as sealed"
             )
         truths[file.stem] = read_json(file)
     return truths
 
 
-def _sealed_in(folders: Iterable[str | Path]) -> list[Path]:
-    return [file for folder in folders for file in Path(folder).glob("*.json")]
+def _list_sealed_files(folders: Iterable[str | Path]) -> list[Path]:
+    """List the sealed documents of some folders by name."""
+    files = [file for folder in folders for file in Path(folder).glob("*.json")]
+    return sorted(files, key=lambda file: file.name)
+
+
+def _hash_file(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()

@@ -1,7 +1,7 @@
-"""A physical robot with hidden defects stands in for a real one: it fills a measurement
-sheet, and goes where it is commanded.
+"""A simulated robot with hidden defects stands in for a real one: it fills a
+measurement sheet and moves as it is commanded.
 
-To rehearse a calibration, from the robot's file to the corrected robot, before a
+With it a calibration is rehearsed, from the robot file to the corrected robot, before a
 tracker is hired.
 """
 
@@ -26,7 +26,7 @@ from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.tables import LARGEST_BYTES
 from elastocal.errors import InputError
 from elastocal.exchange.target_path import read_target_path
-from elastocal.io.atomic_writes import atomic_write, check_places
+from elastocal.io.atomic_writes import check_places, write_atomically
 from elastocal.io.texts import read_text
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.report.words import format_joints, join_items, name_effect
@@ -55,29 +55,55 @@ if TYPE_CHECKING:
     from elastocal.mechanics.robot import Robot
     from elastocal_proof.plant.arm import Arm
 
-# What every arm has that was never calibrated, at each of its joints, beside other
-# gears and weights than its file says.
+# Errors that every robot has which was never calibrated, at each of its joints. Its
+# gears and weights differ from its file too.
 ERRORS_OF_GEOMETRY = ("joint_offset", "link_geometry")
 _COMPENSATORS = ("compensator_stiffness", "compensator_torque")
-# 10 µm at the end of an arm of 2 m.
+# This repeatability moves the end of an arm of 2 m by 10 µm.
 _JOINT_REPEATABILITY_RAD = 5e-6
+# Bounds of an unknown offset of a reflector, and of its unknown rotation.
+_MAX_OFFSET_M = 0.1
+_MAX_ROTATION_RAD = np.pi / 2
+# Columns that identify a state in a measurement sheet.
 _STATE = ["pose", "load", "repeat"]
-# A path to mill: its width over the reach, and its poses; postures that are tried until
-# it stays within the limits.
-_BOW = 0.2
-_BOW_POSES = 50
-_TRIES = 200
+# Length of a milling path over the reach, and number of its poses.
+_PATH_SHARE = 0.2
+_PATH_POSES = 50
+# Postures that are tried until a path stays within the joint limits.
+_MAX_POSTURES = 200
+# Largest step of a joint along a path; a larger one is a jump to another posture.
+_MAX_STEP_RAD = 0.1
+# Relative error of a moment that is rounding.
+_MOMENT_ROUNDING = 1e-6
 
 
 def build_hidden_robot(
     robot_file: str | Path, seed: int, effects: Sequence[str] = ()
 ) -> tuple[SimulatedRobot, list[Defect]]:
-    """The robot that stands in, and its defects.
+    """Build the robot that stands in for a real one.
 
-    `effects`: keys of `KINDS`, each at a joint that is drawn; one that is drawn by
-    default. Raises `InputError`: an effect that this arm cannot have.
+    Parameters
+    ----------
+    robot_file : path
+        Robot file of which the robot is a specimen.
+    seed : int
+        Seed of its errors.
+    effects : sequence of str
+        Hidden effects, keys of `KINDS`, each at a joint that is drawn; by default one
+        effect that is drawn.
+
+    Returns
+    -------
+    SimulatedRobot
+        The robot.
+    list of Defect
+        Its defects: errors of geometry, then the hidden effects.
+
+    Raises
+    ------
+    InputError
+        If this arm cannot have one of the effects.
     """
-    declared = read_robot(robot_file)
     arm = read_arm(robot_file)
     possible = sorted(
         name
@@ -90,38 +116,36 @@ def build_hidden_robot(
     for name in effects:
         if name not in possible:
             raise InputError("rehearsal", "effects", repr(name), ", ".join(possible))
-    # Nobody's catalogue offers a compensator to an arm whose file has none.
-    if declared.compensator is None:
-        possible = [name for name in possible if name not in _COMPENSATORS]
-    chosen = tuple(effects)
+    if not effects:
+        # The catalogue offers no compensator effect to an arm whose file has no
+        # compensator.
+        if read_robot(robot_file).compensator is None:
+            possible = [name for name in possible if name not in _COMPENSATORS]
+        draw = open_simulation_stream(seed, "hidden effect").integers(len(possible))
+        effects = (possible[draw],)
     draws = open_simulation_stream(seed, "errors of geometry")
-    if not chosen:
-        chosen = (
-            possible[
-                open_simulation_stream(seed, "hidden effect").integers(len(possible))
-            ],
-        )
-    of_geometry = [
-        Defect(
-            name,
-            joints,
-            KINDS[name].scale_plausible_size(arm) * draws.uniform(),
-            seed + 1 + place,
-        )
-        for name in ERRORS_OF_GEOMETRY
-        for place, joints in enumerate(KINDS[name].locations(arm))
-    ]
-    defects = [*of_geometry, *(draw_defect(name, arm, seed) for name in chosen)]
-    robot = replace(
-        draw_specimen(arm, seed),
-        repeatability_rad=(_JOINT_REPEATABILITY_RAD,) * arm.joints,
-    )
+    defects = []
+    for name in ERRORS_OF_GEOMETRY:
+        kind = KINDS[name]
+        for index, joints in enumerate(kind.locations(arm)):
+            size = kind.scale_plausible_size(arm) * draws.uniform()
+            defects.append(Defect(name, joints, size, seed + 1 + index))
+    defects += [draw_defect(name, arm, seed) for name in effects]
+    repeatability_rad = (_JOINT_REPEATABILITY_RAD,) * arm.joints
+    robot = replace(draw_specimen(arm, seed), repeatability_rad=repeatability_rad)
     return apply_defects(robot, defects), defects
 
 
 def describe_hidden_effects(defects: Sequence[Defect], effects: Sequence[str]) -> str:
-    """What `build_hidden_robot` hid of effects that were asked for, or drew; the small errors
-    that every robot has stand before."""
+    """Describe the hidden effects of `build_hidden_robot` in words.
+
+    Parameters
+    ----------
+    defects : sequence of Defect
+        All defects of the robot.
+    effects : sequence of str
+        Hidden effects that were asked for; empty if one was drawn.
+    """
     hidden = defects[-max(len(effects), 1) :]
     return join_items(
         f"{name_effect(defect.effect)}{format_joints(defect.effect, defect.joints)}"
@@ -130,125 +154,152 @@ def describe_hidden_effects(defects: Sequence[Defect], effects: Sequence[str]) -
 
 
 def misplace_base(robot: SimulatedRobot, seed: int) -> SimulatedRobot:
-    """The robot beside a tracker whose frame of the base is off by some 0.3 mrad and
+    """Return the robot with a tracker whose base frame is wrong by about 0.3 mrad and
     0.2 mm."""
-    return replace(
-        robot, tracker=replace(robot.tracker, misplaced=draw_misplaced_base(seed))
-    )
+    tracker = replace(robot.tracker, misplaced=draw_misplaced_base(seed))
+    return replace(robot, tracker=tracker)
 
 
 def fill_sheet(
     path: Path, document: Mapping[str, Any], robot: SimulatedRobot, seed: int
 ) -> int:
-    """Fill the measurement sheet at `path` with what a tracker reads; returns how many
-    measurements it has now.
+    """Fill the measurement sheet at `path` with the readings of a tracker.
 
-    Its columns are those of measurements.csv; those of the tracker may be missing or
-    empty. `document`: of campaign.yaml. `seed`: of the noise, and of where reflectors
-    sit whose offset or rotation is unknown. Raises `InputError`: a column that is
-    missing or no number, a target that the campaign does not have, or a moment that is
-    not that of the row's force at a lever.
+    Parameters
+    ----------
+    path : path
+        Sheet with the columns of measurements.csv; those of the tracker may be missing
+        or empty.
+    document : mapping
+        Contents of campaign.yaml.
+    robot : SimulatedRobot
+        The robot that is measured.
+    seed : int
+        Seed of the noise, and of unknown offsets and rotations of reflectors.
+
+    Returns
+    -------
+    int
+        Number of measurements in the sheet.
+
+    Raises
+    ------
+    InputError
+        If a column is missing or has an entry that is no number, if the campaign lacks
+        a target, or if a moment is not that of the row's force at a lever.
     """
     check_places(path)
-    sheet = _read_table(path)
     source = path.as_posix()
-    targets = document["targets"]
-    require_numbers(
-        sheet,
-        [*_STATE, *(f"q{j + 1}" for j in range(robot.arm.joints)), *WRENCH_NAMES],
-        source,
-    )
+    sheet = _read_table(path)
+    targets = list(document["targets"])
+    joint_names = [f"q{joint}" for joint in range(1, robot.arm.joints + 1)]
+    require_numbers(sheet, [*_STATE, *joint_names, *WRENCH_NAMES], source)
     if "target" not in sheet:
         raise InputError(source, "columns", "no 'target'", "the target of each row")
-    strangers = sheet[~sheet["target"].isin(list(targets))]
-    if len(strangers):
+    unknown = sheet[~sheet["target"].isin(targets)]
+    if len(unknown):
         raise InputError(
             source,
-            f"target, line {strangers.index[0] + 2}",
-            repr(strangers["target"].iloc[0]),
+            f"target, line {unknown.index[0] + 2}",
+            repr(unknown["target"].iloc[0]),
             ", ".join(targets),
         )
     states = sheet.drop_duplicates(_STATE)
-    number = pd.MultiIndex.from_frame(states[_STATE]).get_indexer(
-        pd.MultiIndex.from_frame(sheet[_STATE])
+    schedule = _build_schedule(robot.arm, states, seed, source)
+    position, rotation = _read_targets(robot, schedule, document)
+    rows = (
+        pd.MultiIndex.from_frame(states[_STATE]).get_indexer(
+            pd.MultiIndex.from_frame(sheet[_STATE])
+        ),
+        pd.Index(targets).get_indexer(sheet["target"]),
     )
-    position, rotation = simulate_poses(
-        robot, _schedule(robot.arm, states, seed, source)
-    )
-    at = [robot.arm.points.index(target["point"]) for target in targets.values()]
-
-    def where(value: str | Sequence[float], name: str, within: float) -> np.ndarray:
-        # A draw within bounds where the campaign does not know.
-        return (
-            open_simulation_stream(seed, name).uniform(-within, within, 3)
-            if isinstance(value, str)
-            else np.array(value, float)
-        )
-
-    offsets = np.array(
-        [
-            where(target["offset_m"], f"reflector {name}", 0.1)
-            for name, target in targets.items()
-        ]
-    )
-    mounts = [
-        where(each.get("rotation", np.zeros(3)), f"mount {name}", np.pi / 2)
-        for name, each in targets.items()
-    ]
-    position = position[:, at] + (rotation[:, at] @ offsets[..., None])[..., 0]
-    rotation = rotation[:, at] @ Rotation.from_rotvec(mounts).as_matrix()
-    position, rotation = robot.tracker.read(
-        position, rotation, open_simulation_stream(seed, "readings")
-    )
-    if document["frame"] == "tracker":
-        position, rotation = robot.tracker.to_tracker_frame(position, rotation)
-    seen = number, pd.Index(list(targets)).get_indexer(sheet["target"])
-    measured = dict(zip("xyz", position[seen].T, strict=True))
+    sheet[["x", "y", "z"]] = position[rows]
     if document["measured"] == "pose":
-        measured |= dict(
-            zip(("rx", "ry", "rz"), to_rotation_vector(rotation[seen]).T, strict=True)
-        )
-    _write_table(path, sheet.assign(**measured))
+        sheet[["rx", "ry", "rz"]] = to_rotation_vector(rotation[rows])
+    _write_table(path, sheet)
     return len(sheet)
+
+
+def _read_targets(
+    robot: SimulatedRobot, schedule: Schedule, document: Mapping[str, Any]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Read all targets of a campaign in each state: positions (S, targets, 3), m, and
+    rotations (S, targets, 3, 3), in the campaign's frame."""
+    points = []
+    offsets = []
+    rotation_vectors = []
+    for name, target in document["targets"].items():
+        points.append(robot.arm.points.index(target["point"]))
+        draws = open_simulation_stream(schedule.seed, f"reflector {name}")
+        offsets.append(_draw_if_unknown(target["offset_m"], _MAX_OFFSET_M, draws))
+        mount = target.get("rotation", np.zeros(3))
+        draws = open_simulation_stream(schedule.seed, f"mount {name}")
+        rotation_vectors.append(_draw_if_unknown(mount, _MAX_ROTATION_RAD, draws))
+    position, rotation = simulate_poses(robot, schedule)
+    position = (
+        position[:, points]
+        + (rotation[:, points] @ np.array(offsets)[..., None])[..., 0]
+    )
+    rotation = rotation[:, points] @ Rotation.from_rotvec(rotation_vectors).as_matrix()
+    draws = open_simulation_stream(schedule.seed, "readings")
+    position, rotation = robot.tracker.read(position, rotation, draws)
+    if document["frame"] == "tracker":
+        return robot.tracker.to_tracker_frame(position, rotation)
+    return position, rotation
+
+
+def _draw_if_unknown(
+    value: str | Sequence[float], bound: float, draws: np.random.Generator
+) -> np.ndarray:
+    """Return a vector (3,), drawn within bounds if the campaign calls it unknown."""
+    if isinstance(value, str):
+        return draws.uniform(-bound, bound, 3)
+    return np.array(value, float)
 
 
 def write_milling_path(
     path: Path, declared: Robot, robot: SimulatedRobot, seed: int
 ) -> int:
-    """Write wanted poses along a bow as for milling, under half the usual force of such
-    a robot; returns how many."""
+    """Write wanted poses along a milling path, under half the typical force of such a
+    robot, and return their number."""
     check_places(path)
-    at, turned, angles = draw_milling_path(
-        declared, _BOW * robot.arm.reach_m, _BOW_POSES, np.random.default_rng(seed)
+    position, rotation, angles = draw_milling_path(
+        declared,
+        _PATH_SHARE * robot.arm.reach_m,
+        _PATH_POSES,
+        np.random.default_rng(seed),
     )
-    force = np.tile(
-        [0.0, 0.0, get_typical_force_N(robot.arm) / 2, 0.0, 0.0, 0.0], (len(at), 1)
-    )
-    names = [
-        "x",
-        "y",
-        "z",
-        "rx",
-        "ry",
-        "rz",
-        *WRENCH_NAMES,
-        *(f"q{j + 1}" for j in range(len(angles[0]))),
-    ]
-    columns = np.column_stack(
-        [at, Rotation.from_matrix(turned).as_rotvec(), force, angles]
-    )
-    _write_table(path, pd.DataFrame(columns, columns=names))
-    return len(at)
+    force = get_typical_force_N(robot.arm) / 2
+    wrench = np.tile([0.0, 0.0, force, 0.0, 0.0, 0.0], (_PATH_POSES, 1))
+    joint_names = [f"q{joint}" for joint in range(1, angles.shape[1] + 1)]
+    names = ["x", "y", "z", "rx", "ry", "rz", *WRENCH_NAMES, *joint_names]
+    columns = [position, Rotation.from_matrix(rotation).as_rotvec(), wrench, angles]
+    _write_table(path, pd.DataFrame(np.column_stack(columns), columns=names))
+    return _PATH_POSES
 
 
 def measure_errors(
     path: Path, targets: Path, robot: SimulatedRobot, seed: int
 ) -> dict[str, np.ndarray]:
-    """Distances (N,), m, of where the tracker sees the robot from the wanted poses, in
-    the campaign's frame of the base.
+    """Measure the distances of the robot from wanted poses, in the campaign's base
+    frame.
 
-    By "uncorrected" and "corrected" `targets`, as `elastocal correct` wrote them for
-    `path`; "noise alone": of an exact model.
+    Parameters
+    ----------
+    path : path
+        Wanted poses.
+    targets : path
+        Joint targets as `elastocal correct` wrote them for these poses.
+    robot : SimulatedRobot
+        The robot that is measured.
+    seed : int
+        Seed of noise and repeatability.
+
+    Returns
+    -------
+    dict
+        Distances (N,), m, of the "uncorrected" and the "corrected" targets, and of
+        "noise alone", which an exact model would leave.
     """
     wanted = read_target_path(path, robot.arm.joints)
     table = _read_table(targets)
@@ -257,124 +308,168 @@ def measure_errors(
         raise InputError(
             source, "rows", str(len(table)), f"{len(wanted)}, the poses of {path}"
         )
-    wrench = np.zeros((len(wanted), 6)) if wanted.wrench is None else wanted.wrench
-    off = {}
-    for name, ending in (("uncorrected", "_uncorrected"), ("corrected", "")):
-        columns = [f"q{joint}{ending}" for joint in range(1, robot.arm.joints + 1)]
+    wrench = wanted.wrench
+    if wrench is None:
+        wrench = np.zeros((len(wanted), 6))
+    errors = {}
+    for name, suffix in (("uncorrected", "_uncorrected"), ("corrected", "")):
+        columns = [f"q{joint}{suffix}" for joint in range(1, robot.arm.joints + 1)]
         require_numbers(table, columns, source)
         angles = table[columns].to_numpy(float)
-        visits = [
-            move_robot(robot, angles, wrench, number, source)
-            for number in (seed, seed + 1)
-        ]
-        position, rotation = (part[:, None] for part in visits[0])
-        noise = (
-            robot.tracker.read(
-                position, rotation, open_simulation_stream(seed, "noise along a path")
-            )[0][:, 0]
-            - visits[0][0]
-        )
-        off[name] = np.linalg.norm(visits[0][0] + noise - wanted.position, axis=1)
-        # Half the square of the difference of two visits is the repeatability's.
-        off["noise alone"] = np.linalg.norm(
-            noise + (visits[0][0] - visits[1][0]) / np.sqrt(2.0), axis=1
-        )
-    return off
+        position, rotation = move_robot(robot, angles, wrench, seed, source)
+        second_position, _ = move_robot(robot, angles, wrench, seed + 1, source)
+        draws = open_simulation_stream(seed, "noise along a path")
+        measured, _ = robot.tracker.read(position[:, None], rotation[:, None], draws)
+        noise = measured[:, 0] - position
+        errors[name] = np.linalg.norm(position + noise - wanted.position, axis=1)
+        # The variance of the repeatability is half the mean square of the difference of
+        # two visits.
+        repeatability = (position - second_position) / np.sqrt(2.0)
+        errors["noise alone"] = np.linalg.norm(noise + repeatability, axis=1)
+    return errors
 
 
 def move_robot(
     robot: SimulatedRobot,
-    shown: np.ndarray,
+    angles: np.ndarray,
     wrench: np.ndarray,
     seed: int,
     source: str = "commands",
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where the end effector comes to rest, (N, 3), m, and (N, 3, 3), in the frame that
-    is declared as the base's; no noise.
+    """Move the robot, and return where its end effector comes to rest, without noise.
 
-    `shown` (N, n): commanded joint angles as the controller shows them, rad; each is
-    approached afresh. `wrench` (N, 6): at the last measuring point, base axes. `seed`:
-    of the repeatability of the drives.
+    Parameters
+    ----------
+    robot : SimulatedRobot
+        The robot.
+    angles : (N, n) array
+        Commanded joint angles as the controller reports them, rad; each command is
+        approached afresh.
+    wrench : (N, 6) array
+        Load at the last measuring point, base axes.
+    seed : int
+        Seed of the repeatability of the drives.
+    source : str
+        Origin of the commands, for error messages.
+
+    Returns
+    -------
+    (N, 3) and (N, 3, 3) arrays
+        Positions, m, and rotations in the declared base frame.
     """
-    columns = dict(
-        zip(
-            [*(f"q{j + 1}" for j in range(shown.shape[1])), *WRENCH_NAMES],
-            [*shown.T, *wrench.T],
-            strict=True,
-        )
-    )
-    rows = pd.DataFrame(
-        columns | {"pose": np.arange(len(shown)), "load": 0, "repeat": 0}
-    )
-    position, rotation = simulate_poses(robot, _schedule(robot.arm, rows, seed, source))
+    count, joints = angles.shape
+    names = [*(f"q{joint}" for joint in range(1, joints + 1)), *WRENCH_NAMES]
+    states = pd.DataFrame(np.hstack([angles, wrench]), columns=names)
+    states = states.assign(pose=np.arange(count), load=0, repeat=0)
+    schedule = _build_schedule(robot.arm, states, seed, source)
+    position, rotation = simulate_poses(robot, schedule)
     return position[:, -1], rotation[:, -1]
 
 
 def draw_milling_path(
     robot: Robot, length_m: float, count: int, draws: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A path in a level plane at one orientation, in a posture that keeps within the
-    limits, as for milling.
+    """Draw a bent path in a horizontal plane at one orientation, in a posture that stays
+    within the joint limits.
 
-    Returns so many positions and rotations, m, base axes, and reported angles of the
-    rigid robot, rad.
+    Parameters
+    ----------
+    robot : Robot
+        The declared robot.
+    length_m : float
+        Length of the path.
+    count : int
+        Number of poses.
+    draws : Generator
+        Random numbers.
+
+    Returns
+    -------
+    (count, 3), (count, 3, 3) and (count, n) arrays
+        Positions, m, and rotations, base axes, and reported angles of the rigid robot,
+        rad.
+
+    Raises
+    ------
+    RuntimeError
+        If no posture is found.
     """
     low, high = robot.joint_limits.T
     share = np.linspace(-0.5, 0.5, count)[:, None]
-    for _ in range(_TRIES):
-        middle = (
-            low + (high - low) * (0.5 + 0.5 * (draws.random(robot.joints) - 0.5))
-        )[None]
+    for _ in range(_MAX_POSTURES):
+        shares = 0.5 + 0.5 * (draws.random(robot.joints) - 0.5)
+        middle = (low + (high - low) * shares)[None]
         heading = draws.uniform(0.0, 2.0 * np.pi)
         ahead = np.array([np.cos(heading), np.sin(heading), 0.0])
         aside = np.array([-np.sin(heading), np.cos(heading), 0.0])
-        at, turned = compute_nominal_poses(robot, robot.reported_angles(middle))
-        position = at + length_m * (share * ahead + share**2 * aside)
-        rotation = np.broadcast_to(turned, (count, 3, 3))
-        angles, left = solve_poses(
-            robot, position, rotation, np.repeat(middle, count, axis=0)
+        centre, orientation = compute_nominal_poses(
+            robot, robot.reported_angles(middle)
         )
-        smooth = np.abs(np.diff(angles, axis=0)).max() < 0.1
+        position = centre + length_m * (share * ahead + share**2 * aside)
+        rotation = np.broadcast_to(orientation, (count, 3, 3))
+        start = np.repeat(middle, count, axis=0)
+        angles, residual_m = solve_poses(robot, position, rotation, start)
         if (
-            left.max() < SOLVED_M
+            residual_m.max() < SOLVED_M
             and not find_beyond_limits(robot, angles).any()
-            and smooth
+            and np.abs(np.diff(angles, axis=0)).max() < _MAX_STEP_RAD
         ):
             return position, rotation, robot.reported_angles(angles)
     raise RuntimeError(
-        f"{robot.name}: no posture in {_TRIES} in which the path lies within the limits"
+        f"{robot.name}: in none of {_MAX_POSTURES} postures does the path lie within"
+        " the joint limits"
     )
 
 
 def require_numbers(table: pd.DataFrame, names: Sequence[str], source: str) -> None:
-    """Refuse a table that lacks one of these columns or has in it what is no number:
-    `InputError` names ``source`` and line."""
+    """Refuse a table that lacks a column or has an entry that is no number, by an
+    `InputError` that names `source` and the line."""
     for name in names:
         if name not in table:
             raise InputError(source, "columns", f"no {name!r}", ", ".join(names))
         wrong = ~np.isfinite(pd.to_numeric(table[name], errors="coerce"))
         if wrong.any():
             row = int(np.argmax(wrong))
-            raise InputError(
-                source,
-                f"{name}, line {row + 2}",
-                repr(table[name].iloc[row]),
-                "a number",
-            )
+            key = f"{name}, line {row + 2}"
+            raise InputError(source, key, repr(table[name].iloc[row]), "a number")
 
 
-def _schedule(arm: Arm, states: pd.DataFrame, seed: int, source: str) -> Schedule:
-    wrench = states[list(WRENCH_NAMES)].to_numpy(float)
+def _build_schedule(arm: Arm, states: pd.DataFrame, seed: int, source: str) -> Schedule:
+    """Build the schedule of states that are each approached afresh."""
     count = len(states)
-    force, moment = np.split(wrench, 2, axis=1)
+    force, moment = np.split(states[list(WRENCH_NAMES)].to_numpy(float), 2, axis=1)
+    lever = _find_levers(force, moment, source)
+    joints = range(1, arm.joints + 1)
+    # Directions of approach that the table does not state are drawn.
+    draws = open_simulation_stream(seed, "approaches")
+    sense = draws.choice([-1, 1], (count, arm.joints))
+    approach_names = [f"approach{joint}" for joint in joints]
+    if set(approach_names) <= set(states):
+        stated = states[approach_names].fillna(0).to_numpy(int)
+        sense = np.where(stated == 0, sense, stated)
+    return Schedule(
+        angle=states[[f"q{joint}" for joint in joints]].to_numpy(float),
+        force=force,
+        lever=lever,
+        **{name: states[name].to_numpy(int) for name in _STATE},
+        approach=np.arange(count),
+        sense=sense,
+        previous=np.full(count, -1),
+        time_s=SECONDS_PER_STATE * np.arange(1, count + 1),
+        training=np.ones(count, bool),
+        seed=seed,
+    )
+
+
+def _find_levers(force: np.ndarray, moment: np.ndarray, source: str) -> np.ndarray:
+    """Find the shortest levers (S, 3) at which forces have their moments, and refuse
+    moments that no lever gives."""
     square = (force**2).sum(axis=1, keepdims=True)
-    # The shortest at which the forces have their moments.
     lever = np.divide(
         np.cross(force, moment), square, out=np.zeros_like(force), where=square > 0
     )
-    wrong = np.abs(np.cross(lever, force) - moment).max(axis=1) > 1e-6 * (
-        1.0 + np.abs(moment).max(axis=1)
-    )
+    error = np.abs(np.cross(lever, force) - moment).max(axis=1)
+    wrong = error > _MOMENT_ROUNDING * (1.0 + np.abs(moment).max(axis=1))
     if wrong.any():
         row = int(np.argmax(wrong))
         raise InputError(
@@ -383,41 +478,20 @@ def _schedule(arm: Arm, states: pd.DataFrame, seed: int, source: str) -> Schedul
             str(moment[row].tolist()),
             "the moment of the force at a lever",
         )
-    approach = [f"approach{j}" for j in range(1, arm.joints + 1)]
-    drawn = open_simulation_stream(seed, "approaches").choice(
-        [-1, 1], (count, arm.joints)
-    )
-    sense = (
-        states[approach].fillna(0).to_numpy(int)
-        if set(approach) <= set(states)
-        else np.zeros_like(drawn)
-    )
-    return Schedule(
-        angle=states[[f"q{j}" for j in range(1, arm.joints + 1)]].to_numpy(float),
-        force=force,
-        lever=lever,
-        **{name: states[name].to_numpy(int) for name in _STATE},
-        approach=np.arange(count),
-        sense=np.where(sense == 0, drawn, sense),
-        previous=np.full(count, -1),
-        time_s=SECONDS_PER_STATE * np.arange(1, count + 1),
-        training=np.ones(count, bool),
-        seed=seed,
-    )
+    return lever
 
 
 def _read_table(path: Path) -> pd.DataFrame:
+    """Read a table, and refuse a file that is none."""
     try:
         return pd.read_csv(io.StringIO(read_text(path, LARGEST_BYTES)))
     except (pd.errors.EmptyDataError, pd.errors.ParserError) as error:
+        reason = str(error).strip().splitlines()[-1]
         raise InputError(
-            path.as_posix(),
-            "table",
-            str(error).strip().splitlines()[-1],
-            "columns under one header",
+            path.as_posix(), "table", reason, "columns under one header"
         ) from error
 
 
 def _write_table(path: Path, table: pd.DataFrame) -> None:
-    with atomic_write(path) as partial:
+    with write_atomically(path) as partial:
         table.to_csv(partial, index=False)

@@ -1,16 +1,16 @@
-"""The table that the closed loop keeps, column by column."""
+"""Columns of the table that the closed loop writes."""
 
 from elastocal.io.storage import Column, TableSchema
 
 
 def build_closed_loop_schema(joints: int) -> TableSchema:
-    """Every wanted pose, what it was commanded as, and how far the robot missed it."""
+    """Build the schema of the table of commanded poses, with the error of each."""
     return TableSchema(
         "closed_loop",
         (
-            Column("effect", "text", "", "what the robot has and nobody declared"),
-            Column("seed", "int32", "", "of the case"),
-            Column("verdict", "text", "", "of the diagnosis"),
+            Column("effect", "text", "", "hidden effect of the robot"),
+            Column("seed", "int32", "", "seed of the case"),
+            Column("verdict", "text", "", "verdict of the diagnosis"),
             Column(
                 "named",
                 "bool",
@@ -23,7 +23,7 @@ def build_closed_loop_schema(joints: int) -> TableSchema:
                 "",
                 "unloaded, loaded, or milling: a path under the process force",
             ),
-            Column("model", "text", "", "by which the targets were corrected"),
+            Column("model", "text", "", "model that corrected the targets"),
             Column("pose", "int32", "", "number of the wanted pose"),
             *(
                 Column(f"q{j}", "float64", "rad", f"commanded angle of joint {j}")
@@ -33,13 +33,13 @@ def build_closed_loop_schema(joints: int) -> TableSchema:
                 "reached_error_m",
                 "float64",
                 "m",
-                "distance of where the robot came to rest from the wanted position",
+                "distance of the pose that the robot reached from the wanted position",
             ),
             Column(
                 "measured_error_m",
                 "float64",
                 "m",
-                "the same as the tracker measures it",
+                "the same distance as the tracker measures it",
             ),
             Column(
                 "predicted_std_m",

@@ -1,13 +1,14 @@
-"""What the verdict on a case is worth, given its ground truth: one row a case, and its
-intervals of parameters.
+"""Scores of the verdict on a blind case, given its ground truth: one row for each case,
+and the intervals of its parameters.
 
-Everything is counted from these rows, by the figures of the plan; see `summary`.
+The figures of the plan are counted from these rows; see `summary`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Collection, Iterable, Mapping
+from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -20,47 +21,58 @@ from elastocal.effects.protocol import effect_of
 from elastocal_proof.blind.cases import Plan, find_absent_effects
 from elastocal_proof.plant.kinds import OUTSIDE
 
+# A sealed document, or a part of it or of verdict.json.
 Document = Mapping[str, Any]
 
 NONE = "none"
-# What a diagnosis calls mechanisms that the catalogue does not have.
+# Name that a diagnosis gives mechanisms outside of the catalogue.
 OTHER = "other"
 COMPLIANCE = "joint_compliance"
-# The effect by which a diagnosis says that the base is not where it is declared.
-_MISPLACED = "base_placement"
-# A scale of the forces is an alias of the compliances, of which weights that are known
-# to a tenth leave next to nothing.
-_SCALE = "force_scale"
-# Effects that lie wholly within another effect or the joint compliances, by effect and
-# joints of the ground truth, with what it is not distinguishable from. Left out are
-# aliases that a known frame, known targets and points at the elbow and wrist resolve:
-# offset of joint 1 and base, last link and tool, tilt of joint 1 and base, coupling of
-# joints 2 and 3 and upper arm.
+# Effect by which a diagnosis says that the base is not where it is declared.
+_MISPLACED_BASE = "base_placement"
+# A scale of the forces is an alias of the compliances. Weights that are known to a tenth
+# leave next to nothing of it.
+_FORCE_SCALE = "force_scale"
+# Effects that lie within the span of another effect or of the joint compliances, by
+# effect and joints of the ground truth, with the mechanism that they cannot be told
+# from. Other aliases are resolved by a known frame, known targets and points at the
+# elbow and the wrist: offset of joint 1 and base, last link and tool, tilt of joint 1
+# and base, coupling of joints 2 and 3 and upper arm.
 EXACT_ALIASES: dict[tuple[str, tuple[int, ...]], str] = {
-    (_SCALE, ()): COMPLIANCE,
+    (_FORCE_SCALE, ()): COMPLIANCE,
     ("compensator_torque", (2,)): "transmission_harmonic",
     ("transmission_harmonic", (2,)): "compensator_torque",
     ("link_weight", (2,)): "compensator_torque",
 }
+# Errors got worse if their increase is beyond this many standard errors.
 _STD_ERRORS = 2.0
+# Probability of a credible set.
 _CREDIBLE = 0.95
 
 
 def compute_rate(hits: Iterable[bool]) -> dict[str, float]:
-    """A share with its Clopper-Pearson interval [1] of 95 %; without cases not a
-    number, and the interval all there is.
+    """Compute a share with its Clopper-Pearson interval [1]_ of 95 %.
 
-    [1] Clopper, C. J. and Pearson, E. S., The use of confidence or fiducial limits illustrated in the case of the binomial,
-        Biometrika 26, 1934.
+    Without cases the share is not a number and the interval is [0, 1].
+
+    References
+    ----------
+    .. [1] Clopper, C. J. and Pearson, E. S., The use of confidence or fiducial limits
+       illustrated in the case of the binomial, Biometrika 26, 1934.
     """
     hits = [bool(hit) for hit in hits]
     count = sum(hits)
     cases = len(hits)
-    low, high = proportion_confint(count, cases, 0.05, "beta") if cases else (0.0, 1.0)
-    share = count / cases if cases else float("nan")
-    low = 0.0 if count == 0 else float(low)
-    high = 1.0 if count == cases else float(high)
-    return {"hits": count, "cases": cases, "rate": share, "low": low, "high": high}
+    if not cases:
+        return {"hits": 0, "cases": 0, "rate": np.nan, "low": 0.0, "high": 1.0}
+    low, high = proportion_confint(count, cases, 0.05, "beta")
+    return {
+        "hits": count,
+        "cases": cases,
+        "rate": count / cases,
+        "low": 0.0 if count == 0 else float(low),
+        "high": 1.0 if count == cases else float(high),
+    }
 
 
 def build_case_row(
@@ -70,164 +82,190 @@ def build_case_row(
     oracle: Document | None = None,
     limit: Document | None = None,
 ) -> dict[str, Any]:
-    """One row of cases.csv: where a case belongs, what was true and found, sizes,
-    errors that were left, what was stated.
+    """Build one row of cases.csv.
 
-    `truth`: a sealed document. `verdict`: as verdict.json. `oracle`, `limit`: of
-    `oracle.fit_oracle` and `limit.limit`, where the case has one. ``exact``: the names
-    found are the true ones; ``named_right``: so, and the verdict states no other name
-    beside it; ``holds_truth``: as many effects were found as were made, and each true
-    one is the name of another of them or among its alternatives, which is an assignment
-    problem [1]; ``wrong_name``: one wrong name is stated alone; ``remains``: something
-    repeatable is said to remain; ``exact_alias``: within another effect that the robot
-    can have, by the ground truth alone.
+    Parameters
+    ----------
+    plan : mapping
+        Contents of config/blind.yaml.
+    truth, verdict : mapping
+        Sealed document of a case, and its verdict as in verdict.json.
+    oracle, limit : mapping, optional
+        Results of `oracle.fit_oracle` and `oracle.assess_best_analyst`.
 
-    [1] Kuhn, H. W., The Hungarian method for the assignment problem, Naval Research
-    Logistics Quarterly 2, 1955.
+    Returns
+    -------
+    dict
+        Besides facts of the case and of its verdict: ``exact``, the names of the
+        verdict are the true ones; ``named_right``, so and the verdict states no other
+        name; ``holds_truth``, the verdict has as many effects as the truth, and each
+        true one is the name or an alternative of a different effect of the verdict;
+        ``wrong_name``, a single wrong name is stated; ``remains``, a repeatable
+        residual is reported; ``exact_alias``, the effect lies within the span of
+        another effect that the robot can have, by the ground truth alone.
     """
-    case, defects, (kind, effects) = (
-        truth["case"],
-        truth["defects"],
-        _apart_from_setup(truth, verdict),
-    )
+    case = truth["case"]
+    defects = truth["defects"]
+    kind, effects = _remove_setup_effects(truth, verdict)
     names = [effect["name"] for effect in effects]
-    true = list(case["effects"])
-    claims = bool(true) and kind in (NAMED, CLASS, SEVERAL)
-    right = claims and sorted(names) == sorted(true)
-    meant = [
-        {effect["name"], *map(effect_of, effect["alternatives"])} for effect in effects
-    ]
-    held = np.array([[name in each for each in meant] for name in true], bool)
-    aliases = [
+    true_names = list(case["effects"])
+    claims = bool(true_names) and kind in (NAMED, CLASS, SEVERAL)
+    exact = claims and sorted(names) == sorted(true_names)
+    repeatable = verdict["repeatable"]
+    joints = ["-".join(map(str, defect["joints"])) for defect in defects]
+    aliases = {
         EXACT_ALIASES.get((defect["effect"], tuple(defect["joints"])))
         for defect in defects
-    ]
-    return (
-        {
-            "case": truth["campaign"],
-            "group": case["group"],
-            "robot": case["robot"],
-            "robots": case["robots"],
-            "setting": case["setting"],
-            "truth": " + ".join(true) or NONE,
-            "level": max(case["levels"], default=0.0),
-            "verdict": kind,
-            "found": " + ".join(names) or NONE,
-            "detected": kind not in (ADEQUATE, NOT_TESTABLE),
-            "exact": right,
-            "named_right": right and kind == NAMED,
-            "holds_truth": claims
-            and len(true) == len(names)
-            and bool(held[linear_sum_assignment(~held)].all()),
-            "wrong_name": kind == NAMED and names != true,
-            "remains": bool((verdict.get("repeatable") or {}).get("remains")),
-            "joints": " + ".join(
-                "-".join(map(str, defect["joints"])) for defect in defects
-            ),
-            "exact_alias": any(
-                alias and alias not in find_absent_effects(plan, case["robot"])
-                for alias in aliases
-            ),
-        }
-        | _size(truth)
-        | _errors(verdict)
-        | {
-            "oracle_detected": np.nan if oracle is None else float(oracle["detected"]),
-            "oracle_rms_m": np.nan if oracle is None else oracle["heldout"]["rms_m"],
-        }
-        | {
-            f"limit_{name}": np.nan if limit is None else float(limit[name])
-            for name in ("detected", "right")
-        }
-        | score_probabilities(truth, verdict)
-    )
-
-
-def _wrong_setup(truth: Document) -> set[str]:
-    """Mechanisms of the set-up that a case has beside what it is about: right to find,
-    and no fault not to name."""
-    return {_MISPLACED} if "misplaced" in truth else set()
-
-
-def _apart_from_setup(truth: Document, verdict: Document) -> tuple[str, list[Document]]:
-    """Verdict and effects without those of the set-up."""
-    kind = verdict["verdict"]
-    effects = list(verdict["effects"])
-    kept = [effect for effect in effects if effect["name"] not in _wrong_setup(truth)]
-    if len(kept) == len(effects):
-        return kind, effects
-    one = CLASS if kept and kept[0]["alternatives"] else NAMED
-    return (ADEQUATE, one, SEVERAL)[min(len(kept), 2)], kept
-
-
-def _size(truth: Document) -> dict[str, Any]:
-    """How large the effects are; for several the squares add up."""
-    defects = truth["defects"]
-    by_raw = any(defect["of"] == "raw" for defect in truth["defects"])
+    }
     return {
-        # Of what all these effects' levels are the non-centrality.
+        "case": truth["campaign"],
+        "group": case["group"],
+        "robot": case["robot"],
+        "robots": case["robots"],
+        "setting": case["setting"],
+        "truth": _join(true_names),
+        "level": max(case["levels"], default=0.0),
+        "verdict": kind,
+        "found": _join(names),
+        "detected": kind not in (ADEQUATE, NOT_TESTABLE),
+        "exact": exact,
+        "named_right": exact and kind == NAMED,
+        "holds_truth": claims and _can_match(true_names, effects),
+        "wrong_name": kind == NAMED and names != true_names,
+        "remains": bool(repeatable and repeatable["remains"]),
+        "joints": " + ".join(joints),
+        "exact_alias": bool(
+            aliases - {None, *find_absent_effects(plan, case["robot"])}
+        ),
+        **_describe_size(truth),
+        **_describe_errors(verdict),
+        "oracle_detected": np.nan if oracle is None else float(oracle["detected"]),
+        "oracle_rms_m": np.nan if oracle is None else oracle["heldout"]["rms_m"],
+        "limit_detected": np.nan if limit is None else float(limit["detected"]),
+        "limit_right": np.nan if limit is None else float(limit["right"]),
+        **score_probabilities(truth, verdict),
+    }
+
+
+def _join(names: Iterable[str]) -> str:
+    return " + ".join(names) or NONE
+
+
+def _can_match(true_names: list[str], effects: list[Document]) -> bool:
+    """Check whether each true name can be assigned to an effect of its own that has it
+    as its name or among its alternatives, by the Hungarian method [1]_.
+
+    References
+    ----------
+    .. [1] Kuhn, H. W., The Hungarian method for the assignment problem, Naval Research
+       Logistics Quarterly 2, 1955.
+    """
+    if len(true_names) != len(effects):
+        return False
+    cost = np.ones((len(effects), len(true_names)))
+    for effect, row in zip(effects, cost, strict=True):
+        possible = {effect["name"], *map(effect_of, effect["alternatives"])}
+        row[[name in possible for name in true_names]] = 0.0
+    return not cost[linear_sum_assignment(cost)].any()
+
+
+def _find_setup_mechanisms(truth: Document) -> set[str]:
+    """Find the mechanisms of the set-up that a case has beside its effects: it is right
+    to report them, and no error not to."""
+    return {_MISPLACED_BASE} if "misplaced" in truth else set()
+
+
+def _remove_setup_effects(
+    truth: Document, verdict: Document
+) -> tuple[str, list[Document]]:
+    """Return the kind of the verdict and its effects without those of the set-up."""
+    effects = list(verdict["effects"])
+    setup = _find_setup_mechanisms(truth)
+    remaining = [effect for effect in effects if effect["name"] not in setup]
+    if len(remaining) == len(effects):
+        return verdict["verdict"], effects
+    if not remaining:
+        return ADEQUATE, remaining
+    if len(remaining) > 1:
+        return SEVERAL, remaining
+    return CLASS if remaining[0]["alternatives"] else NAMED, remaining
+
+
+def _describe_size(truth: Document) -> dict[str, Any]:
+    """Describe how large the effects are; the squares of several effects add up."""
+    defects = truth["defects"]
+    by_raw = any(defect["of"] == "raw" for defect in defects)
+    return {
+        # The non-centrality that all levels of these effects refer to.
         "level_of": "raw" if by_raw else "retained",
-        # What the model absorbs whatever its size is no question of level.
-        "absorbed": by_raw or [defect["effect"] for defect in defects] == [_SCALE],
+        # Effects that the model absorbs at any size are not counted by level.
+        "absorbed": by_raw
+        or [defect["effect"] for defect in defects] == [_FORCE_SCALE],
         "raw": sum(defect["signal"]["raw"] for defect in defects),
         "retained": sum(defect["signal"]["retained"] for defect in defects),
     }
 
 
-def _errors(verdict: Document) -> dict[str, Any]:
-    """Held-out errors, and whether they got worse by more than chance with an effect
-    that was adopted."""
-    # A fault of the data ends a diagnosis before any model is fitted.
-    held = verdict["heldout"] or {
-        "before": {"rms_m": np.nan},
-        "after": {"rms_m": np.nan},
-    }
-    before = held["before"]["rms_m"]
-    after = held["after"]["rms_m"]
+def _describe_errors(verdict: Document) -> dict[str, Any]:
+    """Describe the held-out errors, and whether an effect was adopted and they got
+    worse by more than chance."""
+    heldout = verdict["heldout"]
+    if not heldout:
+        # A fault of the data ends a diagnosis before any model is fitted.
+        return {
+            "before_rms_m": np.nan,
+            "after_rms_m": np.nan,
+            "adopted": False,
+            "worse": False,
+        }
+    before = heldout["before"]["rms_m"]
+    after = heldout["after"]["rms_m"]
+    std_error = heldout["reduction_std_error"]
     return {
         "before_rms_m": before,
         "after_rms_m": after,
-        "adopted": bool(verdict["heldout"])
-        and any(effect.get("adopted", False) for effect in verdict["effects"]),
-        "worse": bool(
-            1.0 - after / before + _STD_ERRORS * held.get("reduction_std_error", np.nan)
-            < 0.0
-        ),
+        "adopted": any(effect["adopted"] for effect in verdict["effects"]),
+        "worse": bool(1.0 - after / before + _STD_ERRORS * std_error < 0.0),
     }
 
 
 def score_probabilities(truth: Document, verdict: Document) -> dict[str, Any]:
-    """What was stated of a case in probabilities, and whether it is so; not a number
-    where nothing was, as with faulty data.
+    """Compare the stated probabilities with the truth.
 
-    A hypothesis is a set of mechanisms, as in ``verdict.json``; the empty set is
-    "nothing". ``stated``: probability of the most probable set, ``top``; ``correct``:
-    whether that is the true one; ``held``: whether the smallest set of hypotheses that
-    reaches 95 %, or all of them where they do not, holds the true one.
+    A hypothesis is a set of mechanisms, as in verdict.json; the empty set is "nothing".
+
+    Returns
+    -------
+    dict
+        ``stated``, probability of the most probable set; ``top``, this set;
+        ``correct``, whether it is the true one; ``held``, whether the true one is in
+        the smallest set of hypotheses that reaches 95 %, or in all of them if they do
+        not reach it. All are not a number if nothing was stated, as with faulty data.
     """
-    ranked = sorted(
-        (verdict.get("probabilities") or {"sets": []})["sets"],
-        key=lambda entry: -entry["probability"],
-    )
+    probabilities = verdict["probabilities"]
+    hypotheses = probabilities["sets"] if probabilities else []
+    ranked = sorted(hypotheses, key=lambda hypothesis: -hypothesis["probability"])
     if not ranked:
         return dict.fromkeys(("stated", "top", "correct", "held"), np.nan)
-    reached = np.cumsum([entry["probability"] for entry in ranked])
+    cumulated = np.cumsum([hypothesis["probability"] for hypothesis in ranked])
+    credible = ranked[: int(np.searchsorted(cumulated, _CREDIBLE)) + 1]
     top = ranked[0]
-    believed = ranked[: int(np.searchsorted(reached, _CREDIBLE)) + 1]
     return {
         "stated": top["probability"],
-        "top": " + ".join(sorted(top["mechanisms"])) or NONE,
+        "top": _join(sorted(top["mechanisms"])),
         "correct": is_true(top["mechanisms"], truth),
-        "held": any(is_true(entry["mechanisms"], truth) for entry in believed),
+        "held": any(
+            is_true(hypothesis["mechanisms"], truth) for hypothesis in credible
+        ),
     }
 
 
 def is_true(mechanisms: Collection[str], truth: Document) -> bool:
-    """Whether a set of mechanisms is what is true of a case.
+    """Check whether a set of mechanisms is the true one of a case.
 
-    Of a mechanism that the catalogue does not have every set that holds "other" is
-    true; one that the joint compliances absorb at any size is as good as nothing, and
-    no measurement could distinguish the two.
+    If the true mechanism is outside of the catalogue, every set with "other" is true. A
+    mechanism that the joint compliances absorb at any size counts as nothing, because
+    no measurement can distinguish the two.
     """
     effects = truth["case"]["effects"]
     if any(effect.startswith(OUTSIDE) for effect in effects):
@@ -235,82 +273,81 @@ def is_true(mechanisms: Collection[str], truth: Document) -> bool:
     absorbed = {
         defect["effect"] for defect in truth["defects"] if defect["of"] == "raw"
     }
-    return set(mechanisms) - _wrong_setup(truth) == set(effects) - absorbed
+    setup = _find_setup_mechanisms(truth)
+    return set(mechanisms) - setup == set(effects) - absorbed
 
 
-def list_intervals(
-    plan: Plan, truth: Document, verdict: Document
-) -> list[dict[str, Any]]:
-    """Every interval of 95 % of a verdict that has a true value to hold, in the usual
-    setting.
+class _Estimate(NamedTuple):
+    """An estimated parameter that has a true value."""
 
-    Wald intervals, with quantiles of Student's t where the noise has degrees of
-    freedom: of joint compliances, and of parameters of an effect that was found at the
-    right joints. A parameter that the data do not identify has no interval.
+    effect: str
+    parameter: str
+    true: float
+    value: float
+    std_error: float
+
+
+def list_intervals(truth: Document, verdict: Document) -> list[dict[str, Any]]:
+    """List the 95 % intervals of a verdict for which there is a true value.
+
+    These are Wald intervals of the joint compliances, and of the parameters of effects
+    that were found at the right joints. Their quantiles are those of Student's t if the
+    noise has degrees of freedom. A parameter that the data do not identify has no
+    interval, and cases of unusual settings have none either.
     """
     case = truth["case"]
     if case["setting"] != "usual":
         return []
-    freedom = verdict["noise"]["degrees_of_freedom"]
-    width = t_distribution.ppf(0.975, freedom) if freedom else norm.ppf(0.975)
-    springs = verdict["compliance_urad_per_Nm"]
-    of_springs = zip(
+    degrees_of_freedom = verdict["noise"]["degrees_of_freedom"]
+    width = norm.ppf(0.975)
+    if degrees_of_freedom:
+        width = t_distribution.ppf(0.975, degrees_of_freedom)
+    compliances = verdict["compliance_urad_per_Nm"]
+    values = zip(
         truth["compliance_urad_per_Nm"],
-        springs["after"],
-        springs["std_error"],
+        compliances["after"],
+        compliances["std_error"],
         strict=True,
     )
-    values = [
-        (COMPLIANCE, f"c{j}", true, value, error)
-        for j, (true, value, error) in enumerate(of_springs, 1)
-        if error > 0
+    estimates = [
+        _Estimate(COMPLIANCE, f"c{joint}", true, value, std_error)
+        for joint, (true, value, std_error) in enumerate(values, 1)
+        if std_error > 0
     ]
-    for defect in truth["defects"]:
-        for effect in verdict["effects"]:
-            if effect["name"] == defect["effect"]:
-                values += _comparable(defect, effect)
-    head: dict[str, Any] = {"truth": " + ".join(case["effects"]) or NONE}
-    head |= {"foreign": any(effect.startswith(OUTSIDE) for effect in case["effects"])}
-    head |= {"level": max(case["levels"], default=0.0)}
-    return [
-        head
-        | {
-            "effect": effect,
-            "parameter": name,
-            "true": true,
-            "value": value,
-            "std_error": error,
-        }
-        | {"holds": bool(abs(value - true) <= width * error)}
-        for effect, name, true, value, error in values
-    ]
+    for defect, effect in product(truth["defects"], verdict["effects"]):
+        if effect["name"] == defect["effect"]:
+            estimates += _list_comparable_parameters(defect, effect)
+    facts = {
+        "truth": _join(case["effects"]),
+        "foreign": any(effect.startswith(OUTSIDE) for effect in case["effects"]),
+        "level": max(case["levels"], default=0.0),
+    }
+    rows = []
+    for estimate in estimates:
+        error = abs(estimate.value - estimate.true)
+        holds = bool(error <= width * estimate.std_error)
+        rows.append(facts | estimate._asdict() | {"holds": holds})
+    return rows
 
 
-def _comparable(
-    defect: Document, effect: Document
-) -> list[tuple[str, str, float, float, float]]:
-    """Parameters of an effect that the plant's law has too, where it was found at the
-    right joints."""
-    found = []
+def _list_comparable_parameters(defect: Document, effect: Document) -> list[_Estimate]:
+    """List the parameters of an effect at the true joints that the law of the simulated
+    robot has too."""
+    true_values = defect["parameters"]
+    true_location = "+".join(map(str, defect["joints"]))
+    estimates = []
     for parameter in effect["parameters"]:
+        # The key of a candidate is such as ``cross_compliance@2+5[variant]``.
         key, _, name = parameter["name"].rpartition(" ")
-        # Such as ``cross_compliance@2+5[variant]``.
-        where = key.partition("[")[0].partition("@")[2]
-        joints: Sequence[int] = (
-            [int(joint) for joint in where.split("+")] if where else []
-        )
-        if (
-            list(joints) == defect["joints"]
-            and name in defect["parameters"]
-            and not parameter["held"]
-        ):
-            found.append(
-                (
+        location = key.partition("[")[0].partition("@")[2]
+        if location == true_location and name in true_values and not parameter["held"]:
+            estimates.append(
+                _Estimate(
                     defect["effect"],
                     name,
-                    defect["parameters"][name],
+                    true_values[name],
                     parameter["value"],
                     parameter["std_error"],
                 )
             )
-    return found
+    return estimates

@@ -1,5 +1,5 @@
-"""The figures of the proof, each beside its target: one counter for all that the plan
-lists, and the tables of its pictures."""
+"""Figures of the blind benchmark and their targets, counted as the plan says, and the
+tables of its pictures."""
 
 from __future__ import annotations
 
@@ -18,12 +18,16 @@ from elastocal_proof.blind.folders import load_ground_truth
 from elastocal_proof.blind.scores import build_case_row, compute_rate, list_intervals
 
 Tables = Mapping[str, pd.DataFrame]
+# An entry of the plan's ``figures``, and its target: words and limits.
 Figure = Mapping[str, Any]
+Target = Mapping[str, Any] | None
 
 _RESAMPLES = 2000
-_SEVERAL_AT_ONCE = 200
-# Held-out errors this near to the oracle's count as its own.
+# Resamples that are evaluated at once, which bounds the memory.
+_BATCH = 200
+# Held-out errors up to this ratio to the oracle's count as equal to them.
 NEAR_ORACLE = 1.05
+# Bins of the reliability diagram and of the calibration error.
 _BINS = 10
 BY_THE_BEST = ", by the best analyst"
 OVER_THE_BEST = ", over the best analyst's, on the same cases"
@@ -32,31 +36,45 @@ _COUNTED = ["detected", "holds_truth", "named_right", "wrong_name", "oracle_dete
 
 
 def select_targets(summary: pd.DataFrame) -> pd.DataFrame:
-    """The figures that have a target, of a summary as it is made or as it is read."""
+    """Select the figures that have a target, of a summary as it is made or read."""
     return summary[summary.target.fillna("").ne("")]
 
 
 def iterate_rows(table: pd.DataFrame) -> Iterator[Any]:
-    """Rows of a table; their attributes are its columns."""
+    """Iterate over the rows of a table, whose attributes are its columns."""
     return table.itertuples()
 
 
 def summarize_figures(
     plan: Plan, cases: pd.DataFrame, intervals: pd.DataFrame, seed: int
 ) -> pd.DataFrame:
-    """Every figure of the plan beside its target, of rows of `scores.build_case_row` and
-    `scores.list_intervals`.
+    """Compute every figure of the plan and compare it with its target.
 
-    Rates have Clopper-Pearson intervals, ratios percentile bootstrap intervals [1] over
-    cases. ``target_low`` and ``target_high`` are the range that the target leaves;
-    ``holds`` is empty where there is no target or no case.
+    Rates have Clopper-Pearson intervals, ratios percentile bootstrap intervals [1]_
+    over cases.
 
-    [1] Efron, B. and Tibshirani, R. J., An Introduction to the Bootstrap, section 13.3,
-    Chapman and Hall, 1993.
+    Parameters
+    ----------
+    plan : mapping
+        Contents of config/blind.yaml.
+    cases, intervals : DataFrame
+        Rows of `scores.build_case_row` and of `scores.list_intervals`.
+    seed : int
+        Seed of the bootstrap.
+
+    Returns
+    -------
+    DataFrame
+        One row for each figure. ``target_low`` and ``target_high`` are the range of the
+        target; ``holds`` is empty without a target or a case.
+
+    References
+    ----------
+    .. [1] Efron, B. and Tibshirani, R. J., An Introduction to the Bootstrap, section
+       13.3, Chapman and Hall, 1993.
     """
-    cases = cases.assign(
-        as_oracle=cases.after_rms_m / cases.oracle_rms_m <= NEAR_ORACLE
-    )
+    ratio = cases.after_rms_m / cases.oracle_rms_m
+    cases = cases.assign(as_oracle=ratio <= NEAR_ORACLE)
     tables = {
         "cases": cases,
         "statements": cases[cases.stated.notna()],
@@ -65,156 +83,139 @@ def summarize_figures(
     rows = [
         row
         for figure in plan["figures"]
-        for row in _counted(plan, figure, tables, seed)
+        for row in _list_figure_rows(plan, figure, tables, seed)
     ]
-    # Where one robot is of those that were tuned on, the whole proves nothing.
-    return pd.DataFrame(rows).assign(
-        robots=PROOF if set(cases.robots) == {PROOF} else TUNED
-    )
+    # A table with a robot that was tuned on proves nothing as a whole.
+    robots = PROOF if set(cases.robots) == {PROOF} else TUNED
+    return pd.DataFrame(rows).assign(robots=robots)
 
 
 def summarize_by_robot(
     plan: Plan, cases: pd.DataFrame, seed: int
 ) -> dict[str, pd.DataFrame]:
-    """As `summarize`, of each robot by itself, by its name; without intervals of
+    """Call `summarize_figures` for each robot by itself, without intervals of
     parameters."""
     return {
-        str(name): summarize_figures(plan, part, pd.DataFrame(), seed)
-        for name, part in cases.groupby("robot")
+        str(robot): summarize_figures(plan, rows, pd.DataFrame(), seed)
+        for robot, rows in cases.groupby("robot")
     }
 
 
-def _counted(
+def _list_figure_rows(
     plan: Plan, figure: Figure, tables: Tables, seed: int
 ) -> Iterator[dict[str, Any]]:
-    """Rows of one entry of the plan's figures."""
+    """List the rows of the summary that one entry of the plan asks for."""
     table = tables[figure.get("table", "cases")]
-    if figure.get("table") == "intervals" and not len(table):
+    if figure.get("table") == "intervals" and table.empty:
         return
-    chosen = table.query(figure["of"]) if "of" in figure else table
+    selected = table.query(figure["of"]) if "of" in figure else table
+    target = figure.get("target")
     if figure.get("each") == "hard":
-        for name, changes in plan["settings"].items():
+        for setting, changes in plan["settings"].items():
             if changes.get("hard"):
-                part = chosen[chosen.setting == name]
-                yield from _measured(
-                    figure,
-                    part,
-                    figure["words"].format(setting=describe_setting(plan, name)),
-                    True,
-                    seed,
-                )
+                rows = selected[selected.setting == setting]
+                words = figure["words"].format(setting=describe_setting(plan, setting))
+                yield from _measure(figure, rows, words, target, seed)
     elif "by" in figure:
-        for level, part in chosen.groupby(figure["by"]):
+        for level, rows in selected.groupby(figure["by"]):
             for entry in figure["parts"]:
-                judged = level in entry.get("levels", [level])
-                yield from _measured(
-                    entry, part, entry["words"].format(at=f"at {level:g}"), judged, seed
-                )
-    elif len(chosen) or not figure.get("if_any"):
-        yield from _measured(figure, chosen, figure["words"], True, seed)
+                words = entry["words"].format(at=f"at {level:g}")
+                target = None
+                if level in entry.get("levels", [level]):
+                    target = entry.get("target")
+                yield from _measure(entry, rows, words, target, seed)
+    elif len(selected) or not figure.get("if_any"):
+        yield from _measure(figure, selected, figure["words"], target, seed)
 
 
 def describe_setting(plan: Plan, setting: str) -> str:
-    """A setting of the cases as people read it."""
-    return str(
-        plan["settings"].get(setting, {}).get("words", setting.replace("_", " "))
-    )
+    """Name a setting of the cases in words."""
+    changes = plan["settings"].get(setting, {})
+    return str(changes.get("words", setting.replace("_", " ")))
 
 
-def _measured(
-    figure: Figure, part: pd.DataFrame, words: str, judged: bool, seed: int
+def _measure(
+    figure: Figure, rows: pd.DataFrame, words: str, target: Target, seed: int
 ) -> Iterator[dict[str, Any]]:
-    target = figure.get("target") if judged else None
+    """Compute a figure from its rows: a share, or what its ``measure`` says."""
     measure = figure.get("measure")
     if measure is None:
-        among = part.query(figure["among"]) if "among" in figure else part
-        yield _row(words, compute_rate(among[str(figure["hits"])]), target)
+        concerned = rows.query(figure["among"]) if "among" in figure else rows
+        share = compute_rate(concerned[str(figure["hits"])])
+        yield _describe_figure(words, share, target)
     elif measure == "over_limit":
-        sampled = part[part.limit_right.notna()]
-        yield _row(
-            f"{words}{BY_THE_BEST}",
-            compute_rate(sampled[str(figure["best"])] == 1.0),
-            None,
-        )
-        hits = (
-            sampled[figure["hits"]].to_numpy(float),
-            sampled[figure["best"]].to_numpy(float),
-        )
-        found = _bootstrapped(
-            hits,
-            _ratio_of_sums,
-            open_stream(seed, "blind", f"{words} over the limit", 0),
-        )
-        yield _row(f"{words}{OVER_THE_BEST}", found, target)
+        sampled = rows[rows.limit_right.notna()]
+        best = sampled[str(figure["best"])].to_numpy(float)
+        hits = sampled[figure["hits"]].to_numpy(float)
+        yield _describe_figure(f"{words}{BY_THE_BEST}", compute_rate(best == 1.0), None)
+        draws = open_stream(seed, "blind", f"{words} over the limit", 0)
+        ratio = _bootstrap((hits, best), _divide_sums, draws)
+        yield _describe_figure(f"{words}{OVER_THE_BEST}", ratio, target)
     elif measure == "calibration_error":
-        yield _row(words, estimate_calibration(part, seed), target)
+        yield _describe_figure(words, estimate_calibration(rows, seed), target)
     elif measure in ("median_ratio", "mean_ratio"):
-        ratio = (part.after_rms_m / part.oracle_rms_m).to_numpy()
-        name, statistic = (
-            ("median", np.median) if measure == "median_ratio" else ("mean", np.mean)
-        )
-        yield _row(
-            words,
-            _bootstrapped(
-                (ratio,), statistic, open_stream(seed, "blind", f"{name} ratio", 0)
-            ),
-            target,
-        )
+        ratios = (rows.after_rms_m / rows.oracle_rms_m).to_numpy()
+        statistic = np.median if measure == "median_ratio" else np.mean
+        draws = open_stream(seed, "blind", measure.replace("_", " "), 0)
+        yield _describe_figure(words, _bootstrap((ratios,), statistic, draws), target)
     else:
         raise ValueError(f"no measure {measure!r}")
 
 
-def _row(
-    words: str, found: Mapping[str, Any], target: Mapping[str, Any] | None
+def _describe_figure(
+    quantity: str, estimate: Mapping[str, Any], target: Target
 ) -> dict[str, Any]:
-    aim = {"words": "", "low": np.nan, "high": np.nan} | (
-        {"low": 0.0, "high": 1.0} | dict(target) if target else {}
-    )
+    """Describe an estimate with its interval, and whether the target is met."""
+    if not target:
+        limits = {"target": "", "target_low": np.nan, "target_high": np.nan}
+        return {"quantity": quantity, **estimate, **limits, "holds": None}
+    low = target.get("low", 0.0)
+    high = target.get("high", 1.0)
     holds = None
-    if target and found["cases"]:
-        holds = bool(
-            aim["low"] <= found["rate"] <= aim["high"]
-            and not found["high"] >= aim.get("below", np.inf)
-        )
-    ends = {
-        "target": aim["words"],
-        "target_low": aim["low"],
-        "target_high": aim["high"],
-        "holds": holds,
-    }
-    return {"quantity": words} | dict(found) | ends
+    if estimate["cases"]:
+        too_uncertain = estimate["high"] >= target.get("below", np.inf)
+        holds = bool(low <= estimate["rate"] <= high and not too_uncertain)
+    limits = {"target": target["words"], "target_low": low, "target_high": high}
+    return {"quantity": quantity, **estimate, **limits, "holds": holds}
 
 
-def _ratio_of_sums(
-    removed: np.ndarray, removable: np.ndarray, axis: int = -1
-) -> np.ndarray:
-    removable = removable.sum(axis=axis)
-    # Where knowing the effect does not help there is nothing to reach.
-    return removed.sum(axis=axis) / np.where(removable > 0, removable, np.nan)
+def _divide_sums(hits: np.ndarray, best_hits: np.ndarray, axis: int = -1) -> np.ndarray:
+    """Divide the number of hits by the best analyst's; if there are none of these,
+    there is nothing to reach."""
+    best_count = best_hits.sum(axis=axis)
+    return hits.sum(axis=axis) / np.where(best_count > 0, best_count, np.nan)
 
 
-def _bootstrapped(
+def _bootstrap(
     samples: tuple[np.ndarray, ...],
     statistic: Callable[..., np.ndarray],
     draws: np.random.Generator,
 ) -> dict[str, Any]:
-    """A statistic with its interval of 95 % over cases."""
-    value = float(statistic(*samples)) if len(samples[0]) else np.nan
+    """Compute a statistic with its percentile bootstrap interval of 95 % over cases."""
+    cases = len(samples[0])
+    value = float(statistic(*samples)) if cases else np.nan
     low = high = np.nan
-    if len(samples[0]) > 1 and np.isfinite(value):
-        how: dict[str, Any] = {
-            "n_resamples": _RESAMPLES,
-            "batch": _SEVERAL_AT_ONCE,
-            "vectorized": True,
-            "paired": True,
-            "rng": draws,
-        }
+    if cases > 1 and np.isfinite(value):
         low, high = bootstrap(
-            samples, statistic, method="percentile", **how
+            samples,
+            statistic,
+            n_resamples=_RESAMPLES,
+            batch=_BATCH,
+            vectorized=True,
+            paired=True,
+            method="percentile",
+            rng=draws,
         ).confidence_interval
+    return _describe_estimate(cases, value, low, high)
+
+
+def _describe_estimate(
+    cases: int, value: float, low: float, high: float
+) -> dict[str, Any]:
+    """Describe an estimate with its interval like a rate, but without hits."""
     return {
         "hits": None,
-        "cases": len(samples[0]),
+        "cases": cases,
         "rate": value,
         "low": float(low),
         "high": float(high),
@@ -224,135 +225,138 @@ def _bootstrapped(
 def compute_calibration_error(
     probability: np.ndarray, correct: np.ndarray
 ) -> np.ndarray:
-    """Expected calibration error [1] [2] (...,) of (..., n): sum over bins of n_b / n
-    |mean stated - share correct|.
+    """Compute the expected calibration error [1]_ [2]_: the sum over bins of n_b / n
+    |mean stated probability - share correct|.
 
-    Even of verdicts that are calibrated it is not 0, for the share of few cases
-    scatters.
+    It is not 0 even for calibrated verdicts, because the shares of few cases scatter.
 
-    [1] Naeini, M. P., Cooper, G. F. and Hauskrecht, M., Obtaining well calibrated probabilities using Bayesian binning, AAAI
-        Conference on Artificial Intelligence, 2015.
-    [2] Guo, C., Pleiss, G., Sun, Y. and Weinberger, K. Q., On calibration of modern neural networks, International Conference
-        on Machine Learning, 2017.
+    Parameters
+    ----------
+    probability, correct : (..., n) arrays
+        Stated probabilities, and whether the statements are correct.
+
+    Returns
+    -------
+    (...,) array
+
+    References
+    ----------
+    .. [1] Naeini, M. P., Cooper, G. F. and Hauskrecht, M., Obtaining well calibrated
+       probabilities using Bayesian binning, AAAI Conference on Artificial Intelligence,
+       2015.
+    .. [2] Guo, C., Pleiss, G., Sun, Y. and Weinberger, K. Q., On calibration of modern
+       neural networks, International Conference on Machine Learning, 2017.
     """
     probability, correct = np.broadcast_arrays(
         np.asarray(probability, float), np.asarray(correct, float)
     )
-    if probability.shape[-1] == 0:
+    cases = probability.shape[-1]
+    if cases == 0:
         return np.full(probability.shape[:-1], np.nan)
-    which = _bin_of(probability)
-    return (
-        sum(
-            np.abs(((probability - correct) * (which == b)).sum(axis=-1))
-            for b in range(_BINS)
-        )
-        / probability.shape[-1]
-    )
+    bins = _find_bins(probability)
+    differences = probability - correct
+    gaps = [
+        np.abs((differences * (bins == number)).sum(axis=-1)) for number in range(_BINS)
+    ]
+    return sum(gaps) / cases
 
 
 def estimate_calibration(rows: pd.DataFrame, seed: int) -> dict[str, Any]:
-    """The expected calibration error of stated cases, with a basic bootstrap interval
-    [1] of 95 % over cases.
+    """Estimate the expected calibration error of stated cases, with a basic bootstrap
+    interval [1]_ of 95 % over cases.
 
-    [1] Davison, A. C. and Hinkley, D. V., Bootstrap Methods and their Application, section 5.2, Cambridge University Press,
-        1997.
+    References
+    ----------
+    .. [1] Davison, A. C. and Hinkley, D. V., Bootstrap Methods and their Application,
+       section 5.2, Cambridge University Press, 1997.
     """
+    cases = len(rows)
     probability = rows.stated.to_numpy(float)
     correct = rows.correct.to_numpy(bool)
     error = float(compute_calibration_error(probability, correct))
-    low = np.nan
-    high = np.nan
-    if len(rows) > 1:
-        picked = open_stream(seed, "blind", "calibration error", 0).integers(
-            len(rows), size=(_RESAMPLES, len(rows))
+    low = high = np.nan
+    if cases > 1:
+        draws = open_stream(seed, "blind", "calibration error", 0)
+        resamples = draws.integers(cases, size=(_RESAMPLES, cases))
+        replicates = compute_calibration_error(
+            probability[resamples], correct[resamples]
         )
-        again = compute_calibration_error(probability[picked], correct[picked])
-        # The basic interval: a resample of a calibrated sample is less calibrated, by
-        # what the sample is already.
-        low, high = np.maximum(2.0 * error - np.quantile(again, [0.975, 0.025]), 0.0)
-    return {
-        "hits": None,
-        "cases": len(rows),
-        "low": float(low),
-        "high": float(high),
-        "rate": error,
-    }
+        # The interval is basic, because a resample is less calibrated than the sample,
+        # by as much as the sample is less calibrated than the population.
+        quantiles = np.quantile(replicates, [0.975, 0.025])
+        low, high = np.maximum(2.0 * error - quantiles, 0.0)
+    return _describe_estimate(cases, error, low, high)
 
 
 def tabulate_reliability(cases: pd.DataFrame) -> pd.DataFrame:
-    """Data of the reliability diagram [1], for each group of cases, or ``all``, and bin
-    that has a case.
+    """Tabulate the reliability diagram [1]_ for each group of cases, and ``all``, and
+    each bin that has a case.
 
-    [1] Murphy, A. H. and Winkler, R. L., Reliability of subjective probability forecasts of precipitation and temperature,
-        Applied Statistics 26, 1977.
+    References
+    ----------
+    .. [1] Murphy, A. H. and Winkler, R. L., Reliability of subjective probability
+       forecasts of precipitation and temperature, Applied Statistics 26, 1977.
     """
-    rows = cases[cases.stated.notna()]
-    found = []
-    for group in ("all", *sorted(set(rows.group))):
-        part = rows if group == "all" else rows[rows.group == group]
-        which = _bin_of(part.stated.to_numpy(float))
-        for number in sorted(set(which.tolist())):
-            inside = part[which == number]
-            ends = {
-                "from": number / _BINS,
-                "to": (number + 1) / _BINS,
-                "stated": inside.stated.mean(),
-            }
-            found.append({"group": group} | ends | compute_rate(inside.correct))
-    return pd.DataFrame(found, columns=_RELIABILITY)
+    stated = cases[cases.stated.notna()]
+    points = []
+    for group in ("all", *sorted(set(stated.group))):
+        rows = stated[(stated.group == group) | (group == "all")]
+        bins = _find_bins(rows.stated.to_numpy(float))
+        for number in np.unique(bins).tolist():
+            rows_of_bin = rows[bins == number]
+            points.append(
+                {
+                    "group": group,
+                    "from": number / _BINS,
+                    "to": (number + 1) / _BINS,
+                    "stated": rows_of_bin.stated.mean(),
+                    **compute_rate(rows_of_bin.correct),
+                }
+            )
+    return pd.DataFrame(points, columns=_RELIABILITY)
 
 
-def _bin_of(probability: np.ndarray) -> np.ndarray:
+def _find_bins(probability: np.ndarray) -> np.ndarray:
+    """Find the bin of each probability."""
     return np.clip((np.asarray(probability) * _BINS).astype(int), 0, _BINS - 1)
 
 
 def tabulate_rates(cases: pd.DataFrame) -> pd.DataFrame:
-    """Shares of what came of the cases, by group, truth, setting and level.
+    """Tabulate shares of outcomes by group, truth, setting and level.
 
-    Also for ``all`` truths of a group together but those of which the model absorbs
-    everything.
+    The truth ``all`` combines all truths of a group, except those that the model
+    absorbs.
     """
-    together = cases[cases.level_of == "retained"].assign(truth="all")
-    grouped = pd.concat([cases, together]).groupby(
+    combined = cases[cases.level_of == "retained"].assign(truth="all")
+    groups = pd.concat([cases, combined]).groupby(
         ["group", "truth", "setting", "level"]
     )
-    shares = grouped.agg(
-        {"level_of": "first", "case": "size"} | dict.fromkeys(_COUNTED, "mean")
-    )
+    aggregates = {"level_of": "first", "case": "size"}
+    shares = groups.agg(aggregates | dict.fromkeys(_COUNTED, "mean"))
     return shares.rename(columns={"case": "cases"}).reset_index()
 
 
 def score_cases(job: Any) -> None:
-    """The sealed ground truth against the verdicts."""
+    """Score the verdicts against the sealed ground truths."""
     plan = job.params.plan
     truths = load_ground_truth(job.input.sealed, job.input.manifest)
-    verdicts = {
-        verdict["campaign"]: verdict
-        for path in job.input.verdicts
-        for verdict in read_json(path)
-    }
-    oracles = {
-        name: found
-        for path in job.input.oracles
-        for name, found in read_json(path).items()
-    }
-    cases = pd.DataFrame(
-        [
-            build_case_row(plan, truth, verdicts[name], **oracles[name])
-            for name, truth in truths.items()
-        ]
-    )
-    intervals = pd.DataFrame(
-        [
-            row
-            for name, truth in truths.items()
-            for row in list_intervals(plan, truth, verdicts[name])
-        ]
-    )
+    verdicts: dict[str, Any] = {}
+    for path in job.input.verdicts:
+        verdicts |= {verdict["campaign"]: verdict for verdict in read_json(path)}
+    oracles: dict[str, Any] = {}
+    for path in job.input.oracles:
+        oracles |= read_json(path)
+    case_rows = []
+    interval_rows = []
+    for name, truth in truths.items():
+        verdict = verdicts[name]
+        case_rows.append(build_case_row(plan, truth, verdict, **oracles[name]))
+        interval_rows += list_intervals(truth, verdict)
+    cases = pd.DataFrame(case_rows)
+    intervals = pd.DataFrame(interval_rows)
     write_csv(job.output.cases, cases)
     write_csv(job.output.intervals, intervals)
     write_csv(job.output.rates, tabulate_rates(cases))
     write_csv(job.output.reliability, tabulate_reliability(cases))
-    write_csv(
-        job.output.summary, summarize_figures(plan, cases, intervals, job.params.seed)
-    )
+    summary = summarize_figures(plan, cases, intervals, job.params.seed)
+    write_csv(job.output.summary, summary)

@@ -1,5 +1,5 @@
-"""Verdicts on campaigns of the blind proof: the analyst's side, in processes that know
-neither ground truths nor the plant."""
+"""Verdicts on the blind campaigns: the analyst's side, in processes that know neither
+the ground truths nor the simulated robots."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from elastocal.loop.whole import diagnose_folder
 
 
 def diagnose_cases(job: Any) -> None:
-    """Verdicts on a block of blind cases; this process opens no sealed file."""
+    """Diagnose a block of blind cases; this process opens no sealed file."""
     folders = sorted(
         folder for folder in Path(job.input.blind).iterdir() if folder.is_dir()
     )
