@@ -144,7 +144,7 @@ class Conditions:
             self.motion.position[0], wrench_at_base[:3], axis=0
         )
         return self.motion.generalized_forces(
-            self.sites.followed[0].after, wrench_at_base, coordinates
+            self.sites.tracked_points[0].after, wrench_at_base, coordinates
         ).T
 
     @_CachedLoad
@@ -232,9 +232,9 @@ class Conditions:
         It is zero on the joints, whose sag is an effect of its own.
         """
         force = np.zeros((self.motion.place.size, len(self.wrench)))
-        for end, mass in enumerate(self.sites.usual_masses, 1):
+        for end, mass in enumerate(self.sites.typical_masses_kg, 1):
             wrench = self._gravity_wrench(mass, mass * self.motion.position[end])
-            after = self.sites.followed[end].after
+            after = self.sites.tracked_points[end].after
             force += self.motion.generalized_forces(after, wrench)
         force[: self.sites.joints] = 0.0
         return force.T
@@ -243,7 +243,7 @@ class Conditions:
     def total(self) -> np.ndarray:
         """Load by the external wrench and the declared or usual masses on every
         coordinate of the sites, ndarray (S, C)."""
-        if self.sites.usual_weight:
+        if self.sites.bears_typical_weight:
             weight = self.usual_gravity
         elif self.sites.masses:
             weight = self.gravity
@@ -273,7 +273,7 @@ class Conditions:
         else:
             wrench = self._gravity_wrench(0.0, self.motion.rotation[end, :, axis])
         return self.motion.generalized_forces(
-            self.sites.followed[end].after, wrench, slice(self.sites.joints)
+            self.sites.tracked_points[end].after, wrench, slice(self.sites.joints)
         ).T
 
 
@@ -327,7 +327,7 @@ def build_conditions(
         np.asarray(compliance),
         states.joint_angles,
         states.wrench,
-        compute_motion(sites.chain, coordinates, sites.followed),
+        compute_motion(sites.chain, coordinates, sites.tracked_points),
         mass_corrections,
         unknown if states.approach is None else states.approach,
         time_s,

@@ -346,7 +346,9 @@ def evaluate_conditions(
         return conditions
     for _ in range(_LOAD_ITERATIONS):
         displaced = compute_displaced_coordinates(model, estimate, conditions)
-        motion = compute_motion(model.sites.chain, displaced, model.sites.followed)
+        motion = compute_motion(
+            model.sites.chain, displaced, model.sites.tracked_points
+        )
         conditions = replace_motion(conditions, motion)
     return conditions
 
