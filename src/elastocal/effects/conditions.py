@@ -231,7 +231,7 @@ class Conditions:
 
         It is zero on the joints, whose sag is an effect of its own.
         """
-        force = np.zeros((self.motion.place.size, len(self.wrench)))
+        force = np.zeros((self.motion.transform_index.size, len(self.wrench)))
         for end, mass in enumerate(self.sites.typical_masses_kg, 1):
             wrench = self._gravity_wrench(mass, mass * self.motion.position[end])
             after = self.sites.tracked_points[end].after
