@@ -93,7 +93,7 @@ class Conditions:
     compliance : joint compliances, (n,), rad/(N m).
     joint_angles : commanded joint angles, (S, n), rad.
     wrench : external wrench at the last measuring point, (S, 6), N and N m, base axes.
-    motion : motion of `Sites.followed`.
+    motion : motion of `Sites.tracked_points`.
     mass_corrections : errors of the declared masses, (4 m,): for each mass its error in
         kg, then the errors of its first moments along the axes of its frame beyond those
         that the error of the mass causes, kg m.
