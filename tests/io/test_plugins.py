@@ -123,7 +123,7 @@ turning = (False, False)
 targets = build_targets(np.zeros((1, 2)), turning, find_axes(controller, turning, ""))
 inputs = Inputs(np.zeros((2, 6)), np.zeros((2, 0)), np.zeros((2, 3, 6)))
 regression = list_regressions()["mean_residual"]
-(predictor,) = regression.fitted(inputs, np.ones((2, 3)), ({},), 1)
+(predictor,) = regression.fit(inputs, np.ones((2, 3)), ({},), 1)
 print(json.dumps({
     "keys": [key for key in candidates if key.startswith("hoses")],
     "new effects": sorted(set(list_effects()) - set(list_bundled_effects())),
