@@ -44,11 +44,10 @@ def test_each_quantity_has_its_target_its_limit_and_a_column_for_each_robot():
     assert (
         page.startswith("# ") and "blind_pictures --config blind=full seed=7`" in page
     )
-    rows = [
-        [cell.strip() for cell in line.strip("|").split("|")]
-        for line in page.splitlines()
-        if line.startswith("| ")
-    ]
+    rows = []
+    for line in page.splitlines():
+        if line.startswith("| "):
+            rows.append([cell.strip() for cell in line.strip("|").split("|")])
     figures = {row[0]: dict(zip(rows[0], row, strict=True)) for row in rows[1:]}
     # A quantity without a case has no row.
     assert len(figures) == len(rows) - 1 == int((summary.target != "").sum())
