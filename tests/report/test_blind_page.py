@@ -19,6 +19,11 @@ from elastocal_proof.report.blind_page import (
 )
 
 
+def split_cells(row):
+    """Cells of a row of a Markdown table."""
+    return [cell.strip() for cell in row.strip("|").split("|")]
+
+
 def test_each_quantity_has_its_target_its_limit_and_a_column_for_each_robot():
     pairs = [
         truth(("payload",), ("joint_tilt", 2), group="pair", robot=robot)
@@ -63,11 +68,9 @@ def test_each_quantity_has_its_target_its_limit_and_a_column_for_each_robot():
         "found over limit, same sample": "50.0 % (0.0–100.0 %)",
     }
     alarms = figures["false alarms, 3 kN"]
-    assert (alarms["outcome"], alarms["cases"], alarms["limit, on a sample"]) == (
-        "no case",
-        "0 of 0",
-        "",
-    )
+    assert alarms["outcome"] == "no case"
+    assert alarms["cases"] == "0 of 0"
+    assert alarms["limit, on a sample"] == ""
 
 
 def test_the_number_of_reached_targets_names_the_robots():
