@@ -139,7 +139,7 @@ class DataFault:
     parameters : tuple of FaultValue
         Numbers that describe it.
     alternatives : tuple of str
-        What would explain the measurements as well, in words.
+        Other explanations of the measurements, in words.
     evidence : tuple of (float or None)
         RMS residual as written and with the correction, m.
     """
@@ -584,7 +584,7 @@ class Accuracy:
     confidence : float
         Confidence of the limits.
     fitted : bool
-        Whether anything of the robot was fitted; otherwise no error of 0 is one.
+        Whether any parameter of the robot was fitted; if not, there is no prediction.
     """
 
     frame: str

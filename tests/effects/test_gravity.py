@@ -261,19 +261,21 @@ def test_structure_bears_the_usual_weight_where_neither_masses_nor_loads_are_kno
     potential energy."""
     states = make_states(6, 4, seed=7)
     states.wrench[:] = 0.0
-    sites = replace(build_sites(replace(fanuc, payload_kg=100.0)), usual_weight=True)
+    sites = replace(
+        build_sites(replace(fanuc, payload_kg=100.0)), bears_typical_weight=True
+    )
     around = build_conditions(sites, fanuc.compliance, states)
-    assert sites.usual_masses.sum() == pytest.approx(600.0)
+    assert sites.typical_masses_kg.sum() == pytest.approx(600.0)
     assert find_offered_needs(sites, states) & {"load", "load on the joints"} == {
         "load"
     }
 
     def energy(coordinates):
-        ends = compute_motion(sites.chain, coordinates, sites.followed).position[
+        ends = compute_motion(sites.chain, coordinates, sites.tracked_points).position[
             1 : sites.joints + 2
         ]
         return -np.einsum(
-            "k,kis,i->s", sites.usual_masses, ends, np.array(sites.gravity_m_s2)
+            "k,kis,i->s", sites.typical_masses_kg, ends, np.array(sites.gravity_m_s2)
         )
 
     commanded = np.zeros((4, sites.chain.coordinates))
