@@ -196,13 +196,15 @@ class Conditions:
         The coordinates are in the order of the chain. Yields for each mass an array (4,
         K', S) for the K' first of the coordinates, which the mass loads.
         """
-        place = self.motion.transform_index[coordinates]
+        transform_index = self.motion.transform_index[coordinates]
         twist = self.motion.twist[:, coordinates]
         gravity = np.array(self.sites.gravity_m_s2)
         force_per_kg = np.tensordot(gravity, twist[:3], 1)
         for body, mass in enumerate(self.sites.masses, self.sites.joints + 2):
             rotation = self.motion.rotation[body]
-            loaded = np.searchsorted(place, self.sites.tracked_points[body].after)
+            loaded = np.searchsorted(
+                transform_index, self.sites.tracked_points[body].after
+            )
             centre = self.motion.position[body] + np.tensordot(
                 mass.centre_m, rotation, (0, 1)
             )

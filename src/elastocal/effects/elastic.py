@@ -69,9 +69,10 @@ def _make_spring_law(groups: Iterable[Iterable[int]]) -> Law:
 
     def law(conditions: Conditions) -> Displacements:
         load = conditions.total.T
-        return [
-            {coordinate: load[coordinate] for coordinate in group} for group in members
-        ]
+        displacements = []
+        for group in members:
+            displacements.append({coordinate: load[coordinate] for coordinate in group})
+        return displacements
 
     return law
 

@@ -344,8 +344,8 @@ def _gradient_places(sites: Sites) -> list[tuple[int | None, str]]:
     part="link",
     detail_words={"along": "along the arm"}
     | {
-        f"{place}{cause}": f"{words}, by {cause}"
-        for place, words in _GRADIENT_WORDS.items()
+        f"{prefix}{cause}": f"{description}, by {cause}"
+        for prefix, description in _GRADIENT_WORDS.items()
         for cause in CAUSES
     },
     formula=(

@@ -109,13 +109,13 @@ def _list_by_joint(rotations: np.ndarray) -> Displacements:
 
 
 def _compute_sag(
-    conditions: Conditions, places: Iterable[tuple[int, int | None]]
+    conditions: Conditions, mass_locations: Iterable[tuple[int, int | None]]
 ) -> Displacements:
     """Compute the rotations of the joints per kilogram, or kilogram metre, at each place,
     which are arguments of `Conditions.weight`."""
     return [
-        dict(enumerate((conditions.weight(*place) * conditions.compliance).T))
-        for place in places
+        dict(enumerate((conditions.weight(*mass_location) * conditions.compliance).T))
+        for mass_location in mass_locations
     ]
 
 
@@ -161,13 +161,14 @@ def _moment_axes(
 ) -> list[tuple[int, int]]:
     """List each link with each axis across its line along which a first moment loads one
     of the joints."""
-    joints = list(joints)
-    return [
+    axes = [(link, axis) for link in links for axis in sites.transverse_axes(link)]
+    loading = {
         (link, axis)
-        for link in links
-        for axis in sites.transverse_axes(link)
-        if any(sites.moment_turns(link, axis, joint) for joint in joints)
-    ]
+        for joint in joints
+        for link, axis in axes
+        if sites.moment_turns(link, axis, joint)
+    }
+    return [axis_of_link for axis_of_link in axes if axis_of_link in loading]
 
 
 def _sag_of_arm(entry: Effect, sites: Sites, first: int) -> Candidates:
@@ -186,7 +187,7 @@ def _sag_of_arm(entry: Effect, sites: Sites, first: int) -> Candidates:
         variants.append((carried, all_axes, "all links"))
     size = entry.size("mass", sites)
     for links, moment_axes, detail in variants:
-        law = partial(_compute_sag, places=_mass_places(links, moment_axes))
+        law = partial(_compute_sag, mass_locations=_mass_locations(links, moment_axes))
         parameters = _mass_parameters(links, moment_axes, size, "", "{}")
         # Without a load the compliances are not identifiable, and nominal compliances have
         # large errors.
@@ -207,16 +208,19 @@ def _sag_of_joint(
     """Make the candidate of masses that load one joint, as products with its
     compliance."""
     size = entry.size("mass of one joint", sites, joint)
-    places = _mass_places(links, axes)
+    mass_locations = _mass_locations(links, axes)
     return entry.of_joint(
         joint,
         _mass_parameters(links, axes, size, "compliance_times_", "rad {}/(N m)"),
-        lambda conditions: [conditions.weight(*place)[:, joint] for place in places],
+        lambda conditions: [
+            conditions.weight(*mass_location)[:, joint]
+            for mass_location in mass_locations
+        ],
         detail=detail,
     )
 
 
-def _mass_places(
+def _mass_locations(
     links: Sequence[int], axes: Sequence[tuple[int, int]]
 ) -> list[tuple[int, int | None]]:
     """List arguments of `Conditions.weight`: a mass at the end of each link, then a first
@@ -231,7 +235,7 @@ def _mass_parameters(
     prefix: str,
     unit: str,
 ) -> list[Parameter]:
-    """Make parameters in the order of `_mass_places`; `unit` is a format for kg or
+    """Make parameters in the order of `_mass_locations`; `unit` is a format for kg or
     kg m."""
     masses = [
         Parameter(f"{prefix}mass_at_end_of_link_{link}", unit.format("kg"), size)
@@ -318,7 +322,7 @@ def payload(entry: Effect, sites: Sites) -> Candidates:
     """
     mass = entry.size("mass", sites)
     law = partial(
-        _compute_sag, places=[(sites.joints, axis) for axis in (None, 0, 1, 2)]
+        _compute_sag, mass_locations=[(sites.joints, axis) for axis in (None, 0, 1, 2)]
     )
     moments = [
         Parameter(f"moment_{axis}", "kg m", _GRIPPER_LEVER_M * mass) for axis in "xyz"

@@ -205,11 +205,10 @@ def read_measurement_table(
     optional = _read_optional_columns(layout, headers, options, rows)
     cells = text.cells(layout.columns, find_scales(units), rows)
     table = _read_columns(cells, layout, options) | optional.columns
-    table |= {
-        name: cells.numbers(name)
-        for name in (f"approach{joint[1:]}" for joint in layout.angles)
-        if name in layout.columns
-    }
+    for joint in layout.angles:
+        approach = f"approach{joint[1:]}"
+        if approach in layout.columns:
+            table[approach] = cells.numbers(approach)
     table["target"] = _read_targets(cells, options.target)
     table |= _number_loads_and_repeats(cells, table)
     used = {
@@ -363,25 +362,14 @@ def _check_complete(layout: _Layout, robot: Robot | None) -> None:
     unused = f"not yet used: {', '.join(unused_headers)[:200] or 'none'}"
     angles = layout.angles
     if not angles:
-        joint_names = ""
-        if robot and robot.joint_names:
-            joint_names = f" or as the robot has them: {', '.join(robot.joint_names)}"
-        raise InputError(
-            path,
-            "header",
-            "no joint angles",
-            (
-                f"columns q1, q2 …{joint_names}, --column q1=NAME, or --robot FILE with"
-                f" joint_names; {unused}"
-            ),
-        )
+        raise _no_angles_error(layout, robot, unused)
     if robot and len(angles) > robot.joints:
         headers = ", ".join(columns[name] for name in angles)
         raise InputError(
             path,
             "header",
             f"{format_count(len(angles), 'joint')}: {headers}",
-            (f"{robot.joints}, as {robot.name} has; --ignore NAME leaves a column out"),
+            f"{robot.joints}, as {robot.name} has; --ignore NAME leaves a column out",
         )
     joints = robot.joints if robot else int(angles[-1][1:])
     all_angles = [f"q{joint}" for joint in range(1, joints + 1)]
@@ -394,6 +382,20 @@ def _check_complete(layout: _Layout, robot: Robot | None) -> None:
                 f"no column {', '.join(missing)}",
                 f"--column {missing[0]}=NAME; {unused}",
             )
+
+
+def _no_angles_error(layout: _Layout, robot: Robot | None, unused: str) -> InputError:
+    """Make the error of a table without joint angles."""
+    joint_names = ""
+    if robot and robot.joint_names:
+        joint_names = f" or as the robot has them: {', '.join(robot.joint_names)}"
+    return InputError(
+        layout.text.path,
+        "header",
+        "no joint angles",
+        f"columns q1, q2 …{joint_names}, --column q1=NAME, or --robot FILE with"
+        f" joint_names; {unused}",
+    )
 
 
 def _find_filled_rows(layout: _Layout, *, skip_empty: bool) -> np.ndarray:
