@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 from support import refused, robot_of
 
 from elastocal.exchange.column_names import (
+    convert_to_rotation_vectors,
+    find_scales,
     is_name,
     recognize_column,
-    rotation_vectors,
-    scales_of,
 )
 from elastocal.exchange.measurement_table import read_measurement_table
 
@@ -50,7 +50,7 @@ def test_headers_are_recognized(header, name, unit):
 
 def test_units_are_those_of_the_kind():
     scales = {"x": 1e-3, "q7": 1e-3, "q1": np.pi / 180, "fx": 9.80665}
-    assert scales_of(
+    assert find_scales(
         {"x": "mm", "q7": "mm", "q1": "degrees", "fx": "kgf"}
     ) == pytest.approx(scales)
 
@@ -198,13 +198,17 @@ def test_rounded_values_pass_and_what_is_no_rotation_is_marked():
     rounded = np.round(
         Rotation.random(20, random_state=3).as_matrix().reshape(-1, 9), 4
     )
-    assert not rotation_vectors("matrix", rounded)[1].any()
+    assert not convert_to_rotation_vectors("matrix", rounded)[1].any()
     wrong = np.vstack(
         [rounded[:1], np.diag([1.0, 1.0, -1.0]).reshape(1, 9), 2 * rounded[:1]]
     )
-    assert rotation_vectors("matrix", wrong)[1].tolist() == [False, True, True]
+    assert convert_to_rotation_vectors("matrix", wrong)[1].tolist() == [
+        False,
+        True,
+        True,
+    ]
     quaternions = np.array([[1.0, 0, 0, 0], [0, 0, 0, 0], [1, 1, 0, 0]])
-    assert rotation_vectors("quaternion", quaternions)[1].tolist() == [
+    assert convert_to_rotation_vectors("quaternion", quaternions)[1].tolist() == [
         False,
         True,
         True,

@@ -11,8 +11,8 @@ from support import refused
 
 from elastocal.exchange.controllers import (
     CONTROLLERS,
-    axes_of,
     check_name,
+    find_axes,
     find_controller,
 )
 
@@ -87,7 +87,7 @@ def test_a_name_that_no_program_may_have_is_refused(name):
 
 
 def test_six_joints_that_turn_are_plain_a_rail_is_an_external_axis_and_others_are_asked_for():
-    assert axes_of(ALL["krl"], (True, *SIX), "") == (
+    assert find_axes(ALL["krl"], (True, *SIX), "") == (
         "E1",
         "A1",
         "A2",
@@ -96,19 +96,19 @@ def test_six_joints_that_turn_are_plain_a_rail_is_an_external_axis_and_others_ar
         "A5",
         "A6",
     )
-    assert axes_of(ALL["rapid"], (True, True, *SIX), "")[:3] == (
+    assert find_axes(ALL["rapid"], (True, True, *SIX), "")[:3] == (
         "eax_a",
         "eax_b",
         "rax_1",
     )
-    assert axes_of(ALL["tp"], (*SIX, True), "")[-2:] == ("J6", "E1")
+    assert find_axes(ALL["tp"], (*SIX, True), "")[-2:] == ("J6", "E1")
     for prismatic in ((False,) * 7, (False,) * 4, (True,) + (False,) * 5):
         with refused("--format", "joints that turn", "--axes", "A1", "E1"):
-            axes_of(ALL["krl"], prismatic, "")
+            find_axes(ALL["krl"], prismatic, "")
     with refused("--format", "joints that turn", "6 joints", "URScript"):
-        axes_of(ALL["urscript"], (False,) * 7, "")
+        find_axes(ALL["urscript"], (False,) * 7, "")
     stated = ("A1", "A2", "E1", "A3", "A4", "A5", "A6")
-    assert axes_of(ALL["krl"], (False,) * 7, ", ".join(stated)) == stated
+    assert find_axes(ALL["krl"], (False,) * 7, ", ".join(stated)) == stated
     for wrong in ("A1,A2", "A1,A1,A2,A3,A4,A5,A6", "J1,A2,E1,A3,A4,A5,A6"):
         with refused("--axes", wrong, "7 different names"):
-            axes_of(ALL["krl"], (False,) * 7, wrong)
+            find_axes(ALL["krl"], (False,) * 7, wrong)

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 
-from elastocal.exchange.controllers import axes_of, targets_of
+from elastocal.exchange.controllers import build_targets, find_axes
 
 ANGLES = np.random.default_rng(6).uniform(-3, 3, (4, 6))
 RAIL = np.array([[0.25], [-1.5], [0.0], [3.125]])
@@ -14,7 +14,7 @@ def make_targets(controller, rail=False, stated=""):
     """Four targets of six axes, with `rail` on a rail before them."""
     angles = np.hstack([RAIL, ANGLES]) if rail else ANGLES
     prismatic = (True,) * rail + (False,) * 6
-    return targets_of(angles, prismatic, axes_of(controller, prismatic, stated))
+    return build_targets(angles, prismatic, find_axes(controller, prismatic, stated))
 
 
 def numbers(text):

@@ -158,8 +158,12 @@ def robot_from_dh(
             ("--ignore", options.ignore),
         ):
             if is_given:
-                found = f"a file of {_KINEMATICS}, which is no table"
-                raise InputError(option, "", found, f"the file without {option}")
+                raise InputError(
+                    option,
+                    "",
+                    f"a file of {_KINEMATICS}, which is no table",
+                    f"the file without {option}",
+                )
         return _robot_from_kinematics(path, name)
     table = _read_table(path, options)
     document: dict[str, Any] = {"name": name}
@@ -168,8 +172,12 @@ def robot_from_dh(
     if not all(joint_name.isdecimal() for joint_name in names) and any(names):
         for joint_name in names:
             if not joint_name or names.count(joint_name) > 1:
-                allowed = "a name for every joint, each once"
-                raise InputError(source, "column joint", repr(joint_name), allowed)
+                raise InputError(
+                    source,
+                    "column joint",
+                    repr(joint_name),
+                    "a name for every joint, each once",
+                )
         document["joint_names"] = names
     words = _format_rows(table.rows, modified=modified)
     short_words = _format_short_chain(table.rows, modified=modified)
@@ -200,8 +208,12 @@ def _read_table(path: str | Path, options: DhOptions) -> _DhTable:
     source = Path(path).as_posix()
     suffix = Path(path).suffix
     if suffix.lower() != ".csv":
-        found = f"a file that ends in {suffix!r}"
-        raise InputError(source, "", found, f".csv, or .yaml with {_KINEMATICS}")
+        raise InputError(
+            source,
+            "",
+            f"a file that ends in {suffix!r}",
+            f".csv, or .yaml with {_KINEMATICS}",
+        )
     text = read_text_table(
         path,
         lambda cells: any(split_unit(cell)[0] in _NEEDED for cell in cells),
@@ -212,9 +224,12 @@ def _read_table(path: str | Path, options: DhOptions) -> _DhTable:
     )
     headers, units = _find_columns(text, options)
     if len(text.lines) > _MOST_ROWS:
-        found = format_count(len(text.lines), "row")
-        allowed = f"at most {_MOST_ROWS}, one for each joint"
-        raise InputError(source, "", found, allowed)
+        raise InputError(
+            source,
+            "",
+            format_count(len(text.lines), "row"),
+            f"at most {_MOST_ROWS}, one for each joint",
+        )
     scales = {name: UNITS[_KINDS[name]][unit] for name, unit in units.items()}
     cells = text.cells(headers, scales)
     if "type" in headers:
@@ -243,8 +258,12 @@ def _find_columns(
         name, stated = (header, None) if header in _WITHOUT_UNIT else split_unit(header)
         if name not in (*_KINDS, *_WITHOUT_UNIT):
             suggestion = suggest_names(header, _USUAL)
-            allowed = f"{suggestion}; import dh --ignore {header!r} leaves it out"
-            raise InputError(text.path, "header", repr(header), allowed)
+            raise InputError(
+                text.path,
+                "header",
+                repr(header),
+                f"{suggestion}; import dh --ignore {header!r} leaves it out",
+            )
         if name in headers:
             raise InputError(text.path, "header", f"{name} twice", "each column once")
         headers[name] = header
@@ -253,8 +272,12 @@ def _find_columns(
             units[name] = _check_unit(text, header, _KINDS[name], unit, options)
     for name in _NEEDED:
         if name not in headers:
-            allowed = "theta_offset, d, a and alpha, such as d_m or d_mm"
-            raise InputError(text.path, "header", f"no column {name}", allowed)
+            raise InputError(
+                text.path,
+                "header",
+                f"no column {name}",
+                "theta_offset, d, a and alpha, such as d_m or d_mm",
+            )
     return headers, units
 
 
@@ -268,8 +291,12 @@ def _check_unit(
         return unit
     found = f"{header!r} in {unit}" if unit else f"no unit of {header!r}"
     option = "--angles deg" if kind == ANGLE else "--lengths mm"
-    allowed = f"{option} or such, or {', '.join(UNITS[kind])} behind the name"
-    raise InputError(text.path, "header", found, allowed)
+    raise InputError(
+        text.path,
+        "header",
+        found,
+        f"{option} or such, or {', '.join(UNITS[kind])} behind the name",
+    )
 
 
 def _check_angles(cells: Cells, name: str, values: np.ndarray, unit: str) -> None:
@@ -398,8 +425,12 @@ def _read_links(path: str | Path) -> tuple[dict[str, Any], bool]:
     source = Path(path).as_posix()
     document = read_document(path)
     if not isinstance(document, dict) or _KINEMATICS not in document:
-        allowed = f"{_KINEMATICS} as ROS drivers write them, or a table as .csv"
-        raise InputError(source, "", f"no {_KINEMATICS}", allowed)
+        raise InputError(
+            source,
+            "",
+            f"no {_KINEMATICS}",
+            f"{_KINEMATICS} as ROS drivers write them, or a table as .csv",
+        )
     entries = document[_KINEMATICS]
     allowed = f"links, each with {', '.join(_KEYS)}"
     if not isinstance(entries, dict):
@@ -412,8 +443,12 @@ def _read_links(path: str | Path) -> tuple[dict[str, Any], bool]:
         in_order = [link for link in _JOINTS if link in links]
         for link, expected in zip(in_order, _JOINTS, strict=False):
             if link != expected:
-                allowed = f"every link before {in_order[-1]}"
-                raise InputError(source, _KINEMATICS, f"no link {expected}", allowed)
+                raise InputError(
+                    source,
+                    _KINEMATICS,
+                    f"no link {expected}",
+                    f"every link before {in_order[-1]}",
+                )
         links = {link: links[link] for link in in_order}
     return links, "hash" in entries
 
@@ -423,13 +458,15 @@ def _read_origin(origin: object, source: str, key: str) -> list[float]:
     if not isinstance(origin, dict):
         raise InputError(source, key, type(origin).__name__, ", ".join(_KEYS))
     if set(origin) != set(_KEYS):
-        found = ", ".join(map(str, origin)) or "nothing"
-        raise InputError(source, key, found, ", ".join(_KEYS))
+        raise InputError(
+            source, key, ", ".join(map(str, origin)) or "nothing", ", ".join(_KEYS)
+        )
     values = []
     for name in _KEYS:
         value = parse_number(str(origin[name]))
         if value is None:
-            found = repr(origin[name])
-            raise InputError(source, f"{key}.{name}", found, NUMBER_ALLOWED)
+            raise InputError(
+                source, f"{key}.{name}", repr(origin[name]), NUMBER_ALLOWED
+            )
         values.append(value)
     return values

@@ -160,8 +160,9 @@ def write_robot(imported: ImportedRobot, path: str | Path) -> None:
     try:
         write_text(path, format_robot_file(imported))
     except OSError as error:
-        allowed = "a place for a file"
-        raise InputError(path, "", describe_os_error(error), allowed) from None
+        raise InputError(
+            path, "", describe_os_error(error), "a place for a file"
+        ) from None
 
 
 def summarize_import(imported: ImportedRobot) -> list[str]:
@@ -192,12 +193,17 @@ def refuse_existing(path: str | Path, *, force: bool) -> None:
     """Refuse an output path that is a folder or in no folder, and, unless `force`, one
     that exists already."""
     if Path(path).is_dir() or not Path(path).resolve().parent.is_dir():
-        allowed = "a file in an existing folder"
-        raise InputError(path, "", "no place for a file", allowed)
+        raise InputError(
+            path, "", "no place for a file", "a file in an existing folder"
+        )
     check_places(path)
     if Path(path).exists() and not force:
-        allowed = "another --output, or --force to replace it"
-        raise InputError(path, "", "a file that exists already", allowed)
+        raise InputError(
+            path,
+            "",
+            "a file that exists already",
+            "another --output, or --force to replace it",
+        )
 
 
 def format_displacement(transform: np.ndarray) -> list[str]:

@@ -232,10 +232,12 @@ def _convert_limits(joint: Joint, source: str) -> list[float]:
             return list(UNLIMITED_DEG)
         limits = [math.degrees(limit) for limit in limits]
     elif joint.lower >= joint.upper:
-        key = f"joint {joint.name!r}: limit"
-        found = f"{joint.lower:g} to {joint.upper:g}"
-        allowed = 'of a prismatic joint, <limit lower="..." upper="..."> in metres'
-        raise InputError(source, key, found, allowed)
+        raise InputError(
+            source,
+            f"joint {joint.name!r}: limit",
+            f"{joint.lower:g} to {joint.upper:g}",
+            'of a prismatic joint, <limit lower="..." upper="..."> in metres',
+        )
     return [round(limit, _DECIMALS) for limit in limits]
 
 
@@ -305,8 +307,12 @@ def _read_numbers(
     numbers = [value for value in values if value is not None]
     if not len(values) == len(numbers) == count:
         kind = "a number" if count == 1 else f"{count} numbers"
-        allowed = f"{kind}, up to {largest:g} in size"
-        raise InputError(source, f"{key}: {tag} {attribute}", repr(text), allowed)
+        raise InputError(
+            source,
+            f"{key}: {tag} {attribute}",
+            repr(text),
+            f"{kind}, up to {largest:g} in size",
+        )
     return numbers
 
 
@@ -329,11 +335,15 @@ class _Builder(ElementTree.TreeBuilder):
         self.depth = 0
 
     def doctype(self, *_: object) -> None:
-        allowed = (
-            "a URDF without a document type, whose entities could be endless or other"
-            " files"
+        raise InputError(
+            self.source,
+            "",
+            "<!DOCTYPE",
+            (
+                "a URDF without a document type, whose entities could be endless or other"
+                " files"
+            ),
         )
-        raise InputError(self.source, "", "<!DOCTYPE", allowed)
 
     def start(self, tag: str, attrs: dict[str, str]) -> Element:
         uri, _, name = tag.rpartition("}")
@@ -350,8 +360,9 @@ class _Builder(ElementTree.TreeBuilder):
 
     def _refuse_more_than(self, count: int, most: int, noun: str) -> None:
         if count > most:
-            found = f"more than {most} {noun}"
-            raise InputError(self.source, "", found, "a URDF, which needs fewer")
+            raise InputError(
+                self.source, "", f"more than {most} {noun}", "a URDF, which needs fewer"
+            )
 
     def end(self, tag: str) -> Element:
         self.depth -= 1
@@ -364,9 +375,12 @@ def _parse(data: bytes, source: str) -> Element:
     try:
         root = ElementTree.fromstring(data, parser)
     except ElementTree.ParseError as error:
-        key = f"line {error.position[0]}"
-        found = str(error).partition(":")[0]
-        raise InputError(source, key, found, "a URDF, which is XML") from None
+        raise InputError(
+            source,
+            f"line {error.position[0]}",
+            str(error).partition(":")[0],
+            "a URDF, which is XML",
+        ) from None
     except InputError:
         raise
     except (ValueError, LookupError) as error:
@@ -388,39 +402,51 @@ def _check_tree(
         key = f"joint {joint.attrib['name']!r}"
         joint_type = joint.get("type")
         if joint_type not in _KINDS:
-            found = f"type {joint_type!r}"
-            raise InputError(source, key, found, " | ".join(_KINDS))
+            raise InputError(source, key, f"type {joint_type!r}", " | ".join(_KINDS))
         ends = {tag: _get_end(joint, tag) for tag in ("parent", "child")}
         for tag, link in ends.items():
             if link not in link_names:
-                found = f"{tag} {link!r}"
-                raise InputError(source, key, found, "a link of this file")
+                raise InputError(source, key, f"{tag} {link!r}", "a link of this file")
         child = ends["child"]
         if child in parents:
-            found = f"child {child!r}, which another joint has too"
-            raise InputError(source, key, found, "a tree: each link below one joint")
+            raise InputError(
+                source,
+                key,
+                f"child {child!r}, which another joint has too",
+                "a tree: each link below one joint",
+            )
         parents[child] = ends["parent"]
     try:
         TopologicalSorter(
             {child: [parent] for child, parent in parents.items()}
         ).prepare()
     except CycleError as error:
-        key = f"link {error.args[1][0]!r}"
-        allowed = "a tree: no link below itself"
-        raise InputError(source, key, "a loop of joints", allowed) from None
+        raise InputError(
+            source,
+            f"link {error.args[1][0]!r}",
+            "a loop of joints",
+            "a tree: no link below itself",
+        ) from None
 
 
 def _check_names(tag: str, elements: Sequence[Element], source: str) -> None:
     """Refuse no elements, too many, and names that are missing or used twice."""
     if not 0 < len(elements) <= _MOST_PARTS:
-        found = f"{len(elements)} times <{tag}>" if elements else f"no <{tag}>"
-        allowed = f"a URDF with links and joints, at most {_MOST_PARTS}"
-        raise InputError(source, "", found, allowed)
+        raise InputError(
+            source,
+            "",
+            f"{len(elements)} times <{tag}>" if elements else f"no <{tag}>",
+            f"a URDF with links and joints, at most {_MOST_PARTS}",
+        )
     counts = Counter(element.get("name", "") for element in elements)
     for name, count in counts.items():
         if count > 1 or not name:
-            allowed = "a name for each, and each name once"
-            raise InputError(source, f"{tag} {name!r}", f"{count} times", allowed)
+            raise InputError(
+                source,
+                f"{tag} {name!r}",
+                f"{count} times",
+                "a name for each, and each name once",
+            )
 
 
 def find_chain(
@@ -440,12 +466,20 @@ def find_chain(
     for name in points:
         if name not in on_chain:
             names = suggest_names(name, on_chain)
-            allowed = f"a link between {base!r} and {tip!r}: {names}"
-            raise InputError(source, "point", repr(name), allowed)
+            raise InputError(
+                source,
+                "point",
+                repr(name),
+                f"a link between {base!r} and {tip!r}: {names}",
+            )
     marks = {name: f"[{format_point_name(name)}]" for name in (*points, tip)}
     if len(set(marks.values())) < len(marks):
-        allowed = "links whose names differ by more than blanks and brackets"
-        raise InputError(source, "point", ", ".join(map(repr, marks)), allowed)
+        raise InputError(
+            source,
+            "point",
+            ", ".join(map(repr, marks)),
+            "links whose names differ by more than blanks and brackets",
+        )
     words = [marks.get(base, "")]
     moving: list[Joint] = []
     frame = np.eye(4)
@@ -470,8 +504,12 @@ def _find_path(urdf: Urdf, base: str, tip: str, source: str) -> list[Joint]:
     chain."""
     for key, name in (("base", base), ("tip", tip)):
         if name not in urdf.moments:
-            allowed = f"a link: {suggest_names(name, [*urdf.moments])}"
-            raise InputError(source, key, repr(name), allowed)
+            raise InputError(
+                source,
+                key,
+                repr(name),
+                f"a link: {suggest_names(name, [*urdf.moments])}",
+            )
     key = f"base {base!r}, tip {tip!r}"
     path = urdf.path_to(tip, base)
     if base != (path[0].parent if path else tip):
@@ -480,8 +518,9 @@ def _find_path(urdf: Urdf, base: str, tip: str, source: str) -> list[Joint]:
             found = "a base that the tip carries (give them the other way round)"
         raise InputError(source, key, found, "a tip that the base carries")
     if not any(joint.kind in _MOVING for joint in path):
-        found = "no joint that moves between them"
-        raise InputError(source, key, found, "links with joints between")
+        raise InputError(
+            source, key, "no joint that moves between them", "links with joints between"
+        )
     for joint in path:
         _check_joint(joint, source)
     return path
@@ -495,11 +534,15 @@ def _check_joint(joint: Joint, source: str) -> None:
         found = f"type {joint.kind}"
         if joint.mimics:
             found = "a joint that mimics another one"
-        allowed = (
-            f"{' | '.join(kinds)}; parallel links are written in the robot file, see"
-            " docs/campaign.md"
+        raise InputError(
+            source,
+            key,
+            found,
+            (
+                f"{' | '.join(kinds)}; parallel links are written in the robot file, see"
+                " docs/campaign.md"
+            ),
         )
-        raise InputError(source, key, found, allowed)
     if joint.kind in _MOVING and not np.linalg.norm(joint.axis) > _SHORTEST_AXIS:
         axis = " ".join(f"{component:g}" for component in joint.axis)
         raise InputError(source, f"{key}: axis xyz", axis, "a direction")

@@ -212,11 +212,9 @@ def draw_power(rates: pd.DataFrame) -> Figure:
         if _ALL in effects:
             axis.axhline(len(effects) - 1.5, color="black", linewidth=0.8)
     absorbed = set(single[single.level_of == "raw"].truth)
-    labels = []
-    for name in effects:
-        label = "all effects" if name == _ALL else name.replace("_", " ")
-        labels.append(f"{label} *" if name in absorbed else label)
-    axes[0, 0].set_yticklabels(labels, fontsize=7)
+    axes[0, 0].set_yticklabels(
+        [_label_effect(name, absorbed) for name in effects], fontsize=7
+    )
     caption = "Numbers are shares of cases in %."
     if absorbed:
         caption += (
@@ -225,6 +223,11 @@ def draw_power(rates: pd.DataFrame) -> Figure:
         )
     figure.supxlabel(caption, fontsize=7)
     return figure
+
+
+def _label_effect(name: str, absorbed: set[str]) -> str:
+    label = "all effects" if name == _ALL else name.replace("_", " ")
+    return f"{label} *" if name in absorbed else label
 
 
 def _draw_cells(axis: Axes, shares: np.ndarray) -> None:
@@ -269,21 +272,21 @@ def draw_blind(job: Any) -> None:
 def draw_correction_errors(table: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     """Draw the errors of robots after their targets were corrected.
 
-    Each part of the test has a panel, and each correcting model a row.
+    Each test has a panel, and each correcting model a row.
 
     Parameters
     ----------
     table
-        Errors by robot, part and model.
+        Errors by robot, test (column ``part``) and model.
     names
         Names of the robots by those of their files.
     """
     robots = [robot for robot in dict.fromkeys(table["robot"]) if robot != _ALL]
     heights = np.arange(len(_MODELS))[::-1]
     figure, axes = create_panels(1, len(_PARTS), 62, sharey=True, sharex=True)
-    for axis, (part, title) in zip(axes[0], _PARTS.items(), strict=True):
+    for axis, (test, title) in zip(axes[0], _PARTS.items(), strict=True):
         for number, robot in enumerate(robots):
-            chosen = (table["part"] == part) & (table["robot"] == robot)
+            chosen = (table["part"] == test) & (table["robot"] == robot)
             rows = table[chosen].set_index("model").loc[list(_MODELS)]
             rms = rows["rms_mm"].to_numpy()
             limits = rows[["rms_mm_low", "rms_mm_high"]].to_numpy().T

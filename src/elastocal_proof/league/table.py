@@ -3,7 +3,7 @@ with intervals, and write them as a page of text."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -69,48 +69,49 @@ def compare_methods(
     ``covered``: share of coordinates inside the 95 % intervals that the method states.
     """
     robot_of = {data: robot for robot, names in robots.items() for data in names}
-    rows: list[dict[str, Any]] = []
+    rows = []
     for data, split in dict.fromkeys(key[:2] for key in entries):
         predictions = {
-            method: table
-            for (name, kind, method), table in entries.items()
-            if (name, kind) == (data, split)
+            key[2]: table for key, table in entries.items() if key[:2] == (data, split)
         }
-        errors = [_measure_errors(table) for table in predictions.values()]
-        summaries = [summarize_errors(error.distance) for error in errors]
-        rms = [summary["rms_m"] for summary in summaries]
-        references = {
-            "ratio": list(predictions).index(reference),
-            "ratio_to_best": int(np.argmin(rms)),
-        }
-        bootstraps = [
-            compute_error_intervals(
-                errors,
-                _REPLICATES,
-                open_stream(seed, data, f"league {split}", number),
-                index,
-            )
-            for number, index in enumerate(references.values())
-        ]
-        for number, (method, table) in enumerate(predictions.items()):
-            low_m, high_m = bootstraps[0][0][number]["rms_m"]
-            row = {
-                "robot": robot_of[data],
-                "data": data,
-                "split": split,
-                "method": method,
-                "poses": errors[number].poses,
-                "rms_mm": 1e3 * rms[number],
-                "rms_low_mm": 1e3 * low_m,
-                "rms_high_mm": 1e3 * high_m,
-                "max_mm": 1e3 * summaries[number]["max_m"],
-            }
-            for name, (_, reductions) in zip(references, bootstraps, strict=True):
-                row[name] = rms[number] / rms[references[name]]
-                row[f"{name}_low"] = 1.0 - reductions[number].high
-                row[f"{name}_high"] = 1.0 - reductions[number].low
-            rows.append(row | {"covered": _compute_coverage(table)})
+        draws = [open_stream(seed, data, f"league {split}", k) for k in range(2)]
+        key = {"robot": robot_of[data], "data": data, "split": split}
+        rows += [key | row for row in _compare_round(predictions, reference, draws)]
     return pd.DataFrame(rows)
+
+
+def _compare_round(
+    predictions: Mapping[str, pd.DataFrame],
+    reference: str,
+    draws: Sequence[np.random.Generator],
+) -> Iterator[dict[str, Any]]:
+    """Compare methods on the same poses; `draws` are for the two ratios."""
+    errors = [_measure_errors(table) for table in predictions.values()]
+    summaries = [summarize_errors(error.distance) for error in errors]
+    rms = [summary["rms_m"] for summary in summaries]
+    references = {
+        "ratio": list(predictions).index(reference),
+        "ratio_to_best": int(np.argmin(rms)),
+    }
+    bootstraps = [
+        compute_error_intervals(errors, _REPLICATES, stream, index)
+        for stream, index in zip(draws, references.values(), strict=True)
+    ]
+    for number, (method, table) in enumerate(predictions.items()):
+        low_m, high_m = bootstraps[0][0][number]["rms_m"]
+        row = {
+            "method": method,
+            "poses": errors[number].poses,
+            "rms_mm": 1e3 * rms[number],
+            "rms_low_mm": 1e3 * low_m,
+            "rms_high_mm": 1e3 * high_m,
+            "max_mm": 1e3 * summaries[number]["max_m"],
+        }
+        for name, (_, reductions) in zip(references, bootstraps, strict=True):
+            row[name] = rms[number] / rms[references[name]]
+            row[f"{name}_low"] = 1.0 - reductions[number].high
+            row[f"{name}_high"] = 1.0 - reductions[number].low
+        yield row | {"covered": _compute_coverage(table)}
 
 
 def _measure_errors(entries: pd.DataFrame) -> PositionErrors:

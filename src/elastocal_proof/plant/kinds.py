@@ -74,7 +74,11 @@ def _nowhere(arm: Arm) -> list[Location]:
     return [()]
 
 
-def _joints(first: int, behind: int = 0) -> Callable[[Arm], list[Location]]:
+def _any_joint(arm: Arm) -> list[Location]:
+    return [(joint,) for joint in range(1, arm.joints + 1)]
+
+
+def _joints(first: int, behind: int) -> Callable[[Arm], list[Location]]:
     """All joints from `first` on that have at least `behind` joints behind them."""
     return lambda arm: [(joint,) for joint in range(first, arm.joints + 1 - behind)]
 
@@ -89,8 +93,8 @@ def _shoulder(arm: Arm) -> list[Location]:
 _SOFT = (1.0, 0.0)
 _LOAD = (0.0, 1.0)
 KINDS: dict[str, Kind] = {
-    "joint_offset": Kind("rad", 3e-4, _joints(1), laws.joint_offset),
-    "link_geometry": Kind("m", 3e-4, _joints(1), laws.link_geometry),
+    "joint_offset": Kind("rad", 3e-4, _any_joint, laws.joint_offset),
+    "link_geometry": Kind("m", 3e-4, _any_joint, laws.link_geometry),
     # A wrong wavelength, with which the frame of the base was measured too.
     "tracker_scale": Kind(
         "1", 2e-5, _nowhere, partial(laws.set_instrument_error, "tracker", "scale")
@@ -105,15 +109,15 @@ KINDS: dict[str, Kind] = {
     "declared_masses": Kind("1", 0.3, _nowhere, laws.scale_declared_masses),
     "payload": Kind("kg", 25.0, _nowhere, laws.payload, scale=_LOAD),
     "compensator_torque": Kind("N/m", 1e5, _shoulder, laws.compensator_torque),
-    "transmission_harmonic": Kind("rad", 8e-5, _joints(1), laws.transmission_harmonic),
-    "transmission_ratio": Kind("rad/rad", 3e-4, _joints(1), laws.transmission_ratio),
-    "bearing_runout": Kind("m", 3e-5, _joints(1), laws.bearing_runout),
-    "motor_eccentricity": Kind("rad", 6e-5, _joints(1), laws.motor_eccentricity),
-    "transmission_order": Kind("rad", 8e-5, _joints(1), laws.transmission_order),
+    "transmission_harmonic": Kind("rad", 8e-5, _any_joint, laws.transmission_harmonic),
+    "transmission_ratio": Kind("rad/rad", 3e-4, _any_joint, laws.transmission_ratio),
+    "bearing_runout": Kind("m", 3e-5, _any_joint, laws.bearing_runout),
+    "motor_eccentricity": Kind("rad", 6e-5, _any_joint, laws.motor_eccentricity),
+    "transmission_order": Kind("rad", 8e-5, _any_joint, laws.transmission_order),
     "link_elasticity": Kind(
         "1/(N m^2)", 1e-7, list_flexible_links, laws.link_elasticity, scale=_SOFT
     ),
-    "joint_tilt": Kind("rad/(N m)", 2e-7, _joints(1), laws.joint_tilt, scale=_SOFT),
+    "joint_tilt": Kind("rad/(N m)", 2e-7, _any_joint, laws.joint_tilt, scale=_SOFT),
     "base_compliance": Kind(
         "rad/(N m)", 6e-8, _nowhere, laws.base_compliance, scale=_SOFT
     ),
@@ -127,7 +131,7 @@ KINDS: dict[str, Kind] = {
     "joint_dependent_stiffness": Kind(
         "1",
         0.1,
-        _joints(1),
+        _any_joint,
         partial(laws.modulate_stiffness, lambda joint: joint),
         largest=0.8,
     ),
@@ -135,9 +139,9 @@ KINDS: dict[str, Kind] = {
     "flange_flexibility": Kind(
         "rad/(N m)", 2e-7, _nowhere, laws.flange_flexibility, scale=_SOFT
     ),
-    "stiffening": Kind("1", 0.3, _joints(1), laws.stiffening, largest=0.95),
-    "lost_motion": Kind("rad", 7e-5, _joints(1), laws.lost_motion),
-    "hysteresis": Kind("rad", 5e-5, _joints(1), laws.hysteresis, needs=("approach",)),
+    "stiffening": Kind("1", 0.3, _any_joint, laws.stiffening, largest=0.95),
+    "lost_motion": Kind("rad", 7e-5, _any_joint, laws.lost_motion),
+    "hysteresis": Kind("rad", 5e-5, _any_joint, laws.hysteresis, needs=("approach",)),
     "force_scale": Kind(
         "1",
         0.02,
@@ -177,10 +181,10 @@ KINDS: dict[str, Kind] = {
         "rad/(N m)", 1e-7, _joints(2, 1), laws.cable_transmission, scale=_SOFT
     ),
     OUTSIDE + "asymmetric_gear": Kind(
-        "rad/(N m)^2", 1e-10, _joints(1), laws.asymmetric_gear, scale=(1.0, -1.0)
+        "rad/(N m)^2", 1e-10, _any_joint, laws.asymmetric_gear, scale=(1.0, -1.0)
     ),
-    OUTSIDE + "slipping_zero": Kind("rad", 5e-5, _joints(1), laws.slipping_zero),
-    OUTSIDE + "warm_softening": Kind("1/K", 0.01, _joints(1), laws.warm_softening),
+    OUTSIDE + "slipping_zero": Kind("rad", 5e-5, _any_joint, laws.slipping_zero),
+    OUTSIDE + "warm_softening": Kind("1/K", 0.01, _any_joint, laws.warm_softening),
     # A parallel rod: the stiffness of the shoulder depends on the angle of the elbow,
     # or that of the elbow on the angle of the shoulder.
     OUTSIDE + "foreign_angle_stiffness": Kind(
@@ -211,7 +215,7 @@ KINDS: dict[str, Kind] = {
         partial(laws.set_instrument_error, "cell", "crosstalk_per_N"),
         scale=(0.0, -1.0),
     ),
-    OUTSIDE + "short_waves": Kind("rad", 8e-5, _joints(1), laws.short_waves),
+    OUTSIDE + "short_waves": Kind("rad", 8e-5, _any_joint, laws.short_waves),
 }
 
 
