@@ -13,13 +13,11 @@ from typing import TYPE_CHECKING, Any
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.typed_json import (
     OMITTED_BY_DEFAULT,
-    build_json_schema,
     from_document,
     to_document,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
     from pathlib import Path
 
 
@@ -751,8 +749,3 @@ def read_verdict(path: str | Path) -> Verdict:
 def write_verdict(path: str | Path, verdict: Verdict) -> None:
     """Write verdict.json as an atomic write."""
     write_json(path, to_document(verdict), allow_nan=False)
-
-
-def build_verdict_schema() -> Mapping[str, Any]:
-    """Return the JSON schema of verdict.json."""
-    return build_json_schema(Verdict)

@@ -1,5 +1,5 @@
-"""That the rules come to the verdict of the one call, and what a diagnosis is written
-as."""
+"""The rules of the workflow come to the same verdict as one function call, and a
+diagnosis lists all its candidates."""
 
 import json
 from pathlib import Path
@@ -19,68 +19,68 @@ SEED = 1
 
 
 @pytest.fixture(scope="module")
-def both(kuka, tmp_path_factory):
-    """Joint 3 stands a milliradian beyond what it reports; or nothing is missing, so
-    that the seed is seen in the alarm."""
-    found = {}
-    for kind, offset in (("named", 1e-3), ("adequate", 0.0)):
+def folders_and_verdicts(kuka, tmp_path_factory):
+    """Two campaigns and their verdicts. In one, joint 3 stands a milliradian beyond the
+    angle that it reports; in the other nothing is missing, so that the p-value of the
+    alarm depends on the seed."""
+    results = {}
+    for verdict, offset in (("named", 1e-3), ("adequate", 0.0)):
+        folder = tmp_path_factory.mktemp(verdict) / "made"
         table = make_table(kuka, "made", plan=PLAN, offset_of_joint_3=offset)
-        folder = make_folder(tmp_path_factory.mktemp(kind) / "made", kuka, table=table)
-        verdict = as_json(diagnose_folder(folder.as_posix(), ROBOTS.as_posix(), SEED))
-        assert verdict["verdict"] == kind
-        found[kind] = folder, verdict
-    assert [effect["name"] for effect in found["named"][1]["effects"]] == [
-        "joint_offset"
-    ]
-    assert 0.02 < found["adequate"][1]["probabilities"]["alarm_p_value"] < 0.98
-    return found
+        folder = make_folder(folder, kuka, table=table)
+        document = diagnose_folder(folder.as_posix(), ROBOTS.as_posix(), SEED)
+        document = json.loads(json.dumps(document, allow_nan=False))
+        assert document["verdict"] == verdict
+        results[verdict] = folder, document
+    effects = results["named"][1]["effects"]
+    assert [effect["name"] for effect in effects] == ["joint_offset"]
+    p_value = results["adequate"][1]["probabilities"]["alarm_p_value"]
+    assert 0.02 < p_value < 0.98
+    return results
 
 
-def as_json(document):
-    return json.loads(json.dumps(document, allow_nan=False))
-
-
-def same(one, other, path="verdict"):
-    """Equal documents, numbers to what remains where a fit ends: a thousandth of a
-    standard error."""
-    assert type(one) is type(other) or {type(one), type(other)} <= {int, float}, path
-    if isinstance(one, dict):
-        assert list(one) == list(other), path
-        for key in one:
-            same(one[key], other[key], f"{path}.{key}")
-    elif isinstance(one, list):
-        assert len(one) == len(other), path
-        for number, pair in enumerate(zip(one, other, strict=True)):
-            same(*pair, f"{path}[{number}]")
-    elif isinstance(one, float):
-        assert one == pytest.approx(other, rel=1e-3, abs=1e-9), path
+def assert_equal_documents(first, second, path="verdict"):
+    """Compare documents. Numbers may differ by as much as a converged fit does, a
+    thousandth of a standard error."""
+    types = {type(first), type(second)}
+    assert len(types) == 1 or types <= {int, float}, path
+    if isinstance(first, dict):
+        assert list(first) == list(second), path
+        for key in first:
+            assert_equal_documents(first[key], second[key], f"{path}.{key}")
+    elif isinstance(first, list):
+        assert len(first) == len(second), path
+        for number, pair in enumerate(zip(first, second, strict=True)):
+            assert_equal_documents(*pair, f"{path}[{number}]")
+    elif isinstance(first, float):
+        assert first == pytest.approx(second, rel=1e-3, abs=1e-9), path
     else:
-        assert one == other, path
+        assert first == second, path
 
 
-@pytest.mark.parametrize("kind", ["named", "adequate"])
-def test_rules_come_to_the_same_verdict_with_their_tables_between_the_steps(
-    kind, both, tmp_path
+@pytest.mark.parametrize("verdict", ["named", "adequate"])
+def test_rules_with_tables_between_the_steps_come_to_the_same_verdict(
+    verdict, folders_and_verdicts, tmp_path
 ):
-    folder, expected = both[kind]
+    folder, expected = folders_and_verdicts[verdict]
     run_loop(folder, ROBOTS, tmp_path, ANALYSIS)
     by_rules = json.loads(Path(Files(tmp_path).verdict).read_text(encoding="utf-8"))
-    # What to measure next is proposed by the rules alone, beside the verdict.
+    # Only the rules propose the next experiment.
     del by_rules["next_experiment"]
-    same(by_rules, expected)
+    assert_equal_documents(by_rules, expected)
 
 
-def test_every_candidate_is_in_the_table_tested_or_with_a_reason(diagnosis):
-    table = {
-        name: column.to_numpy()
-        for name, column in pd.DataFrame(tabulate_candidates(diagnosis)).items()
-    }
+def test_the_table_lists_every_candidate_as_tested_or_with_a_reason(diagnosis):
+    table = pd.DataFrame(tabulate_candidates(diagnosis))
     assert set(table["candidate"]) == set(diagnosis.case.candidates)
-    tested = np.isfinite(table["log_bayes_factor"])
-    assert (tested == (table["note"] == "")).all() and tested.any() and not tested.all()
-    assert (np.diff(table["log_bayes_factor"][tested]) <= 0).all()
-    assert (table["probability"][tested] >= 0).all()
-    assert table["candidate"][table["chosen"]].tolist() == ["joint_offset@3"]
-    assert table["probability"][table["chosen"]][0] > 0.9
+    is_tested = np.isfinite(table["log_bayes_factor"])
+    assert (is_tested == (table["note"] == "")).all()
+    assert is_tested.any()
+    assert not is_tested.all()
+    assert (np.diff(table["log_bayes_factor"][is_tested]) <= 0).all()
+    assert (table["probability"][is_tested] >= 0).all()
+    chosen = table[table["chosen"]]
+    assert chosen["candidate"].tolist() == ["joint_offset@3"]
+    assert chosen["probability"].iloc[0] > 0.9
     families = [diagnosis.case.candidates[key].family for key in table["candidate"]]
     assert table["family"].tolist() == families

@@ -1,7 +1,7 @@
-"""Held-out poses: residuals by hand, errors before and after, and warnings where the
-figures do not bear the claim."""
+"""Held-out poses: residuals agree with a direct calculation, errors are compared before
+and after, and warnings appear where the figures do not support the claim."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,16 +21,16 @@ from elastocal.verdict import TrainingVerdict
 NOISE = Noise("declared", 6e-5, 6e-5, np.zeros(6))
 
 
-def diagnosis_of(case, steps):
-    """A diagnosis whose verdict has the effects of the steps and one warning that
-    `judge` must leave alone."""
+def make_diagnosis(case, steps):
+    """A diagnosis whose verdict has the effects of the steps, and one warning that
+    `judge` must not change."""
     names = [step.name.removeprefix("with ") for step in steps if step.kind == "effect"]
-    made = CAMPAIGNS["named"]
+    template = CAMPAIGNS["named"]
     inherited = {
-        entry.name: getattr(made, entry.name) for entry in fields(TrainingVerdict)
+        name: getattr(template, name) for name in TrainingVerdict.__dataclass_fields__
     }
     noise = replace(
-        made.noise,
+        template.noise,
         source=NOISE.source,
         position_m=NOISE.position_m,
         orientation_rad=NOISE.orientation_rad,
@@ -38,37 +38,35 @@ def diagnosis_of(case, steps):
         degrees_of_freedom=0,
         pose_rad=0.0,
     )
-    verdict = TrainingVerdict(
-        **inherited
-        | {
-            "effects": tuple(
-                replace(effect_entry(name), family="geometry", heldout_gain=None)
-                for name in names
-            ),
-            "heldout": None,
-            "warnings": ("as it was",),
-            "noise": noise,
-        }
-    )
+    changes = {
+        "effects": tuple(
+            replace(effect_entry(name), family="geometry", heldout_gain=None)
+            for name in names
+        ),
+        "heldout": None,
+        "warnings": ("as it was",),
+        "noise": noise,
+    }
+    no_rows = case.campaign.measurements.select(np.zeros(0, int))
     return Diagnosis(
         case,
         tuple(steps),
         None,
-        verdict,
-        case.campaign.measurements.select(np.zeros(0, int)),
+        TrainingVerdict(**inherited | changes),
+        no_rows,
         Settings(),
     )
 
 
 @pytest.fixture(scope="module")
-def made(cases):
-    """Those cases, and the steps of the first, from frames to an offset."""
+def cases_and_steps(cases):
+    """Training case, held-out case, and the steps of the training case from the frames
+    to the zero offset of joint 3."""
     case = cases[0]
-    members = [cases[0].candidates["joint_offset@3"]]
-    bare, declared = (
-        fit_model(model, case.observations, NOISE)
-        for model in (replace(case.model, effects=()), case.model)
-    )
+    members = [case.candidates["joint_offset@3"]]
+    frames_model = replace(case.model, effects=())
+    frames = fit_model(frames_model, case.observations, NOISE)
+    declared = fit_model(case.model, case.observations, NOISE)
     final = fit_model(
         case.model.with_effects(members),
         case.observations,
@@ -76,181 +74,185 @@ def made(cases):
         declared.estimate.with_effects(members),
     )
     steps = (
-        ("frames and targets", "frames", bare),
-        ("declared model", "declared", declared),
+        Step("frames and targets", "frames", frames),
+        Step("declared model", "declared", declared),
+        Step("with joint_offset", "effect", final),
     )
-    return *cases, tuple(
-        Step(*each) for each in (*steps, ("with joint_offset", "effect", final))
-    )
+    return *cases, steps
 
 
-def judged(steps, case, held_out):
-    """Rows, errors and warnings of the verdict."""
-    return judge(diagnosis_of(case, steps), held_out, 1)
+def judge_steps(steps, case, held_out):
+    return judge(make_diagnosis(case, steps), held_out, 1)
 
 
-def blocks_of(diagnosis, held_out):
+def list_residual_blocks(case, steps, held_out):
+    diagnosis = make_diagnosis(case, steps)
     return list(generate_residual_blocks(diagnosis, judge(diagnosis, held_out, 1)))
 
 
-def about_errors(found):
-    """Warnings but for that of poses outside the fitted range, of which four random
-    ones among 14 may well have one."""
+def select_warnings_of_errors(judgement):
+    """Warnings of the judgement, except those of poses outside the fitted range: four
+    random poses among 14 may well contain one."""
     return [
         warning
-        for warning in found.document["warnings"][1:]
+        for warning in judgement.document["warnings"][1:]
         if "outside the range" not in warning
     ]
 
 
-def fitted_of(steps, kind):
-    return next(step.fitted for step in steps if step.kind == kind)
-
-
-def test_residuals_are_measured_less_predicted_for_every_measurement_in_its_order(made):
-    case, held_out, steps = made
-    robot = case.campaign.robot
-    blocks = blocks_of(diagnosis_of(case, steps), held_out)
-    assert [block["held_out"].all() for block in blocks] == [False, True]
-    for block, part in zip(blocks, (case, held_out), strict=True):
-        read = part.campaign.measurements
-        for name in ("row", "pose", "load", "repeat", "target"):
-            np.testing.assert_array_equal(block[name], getattr(read, name))
-        measured = read.position
-        angles = read.joint_angles
-        wrench = read.wrench
-        np.testing.assert_array_equal(
-            np.column_stack([block[axis] for axis in "xyz"]), measured
+def predict_joint_angles(robot, fitted, measurements, offset_of_joint_3):
+    """Joint angles of the deflected robot, by fixed-point iteration."""
+    compliances = get_joint_compliances(fitted.model, fitted.estimate)
+    angles = measurements.joint_angles
+    # The load acts on the deflected robot.
+    for _ in range(5):
+        _, _, jacobian = compute_poses_and_jacobians(
+            robot.chain, angles, robot.chain.end_effector
         )
-        for stage, kind in (("before", "declared"), ("after", "effect")):
-            fitted = fitted_of(steps, kind)
-            moved = angles
-            # The load is taken where the robot has yielded to it.
-            for _ in range(5):
-                end = compute_poses_and_jacobians(
-                    robot.chain, moved, robot.chain.end_effector
-                )[2]
-                moved = angles + compute_generalized_forces(
-                    end, wrench
-                ) * get_joint_compliances(fitted.model, fitted.estimate)
-                if kind == "effect":
-                    moved[:, 2] += fitted.estimate.coefficients[-1][0]
-            for number, target in enumerate(case.campaign.targets):
-                mask = block["target"] == number
-                predicted = compute_poses(
-                    robot.chain, moved[mask], robot.chain.point(target.point)
-                )[0]
-                off = np.column_stack([block[f"{stage}_d{axis}"] for axis in "xyz"])[
-                    mask
-                ]
-                np.testing.assert_allclose(
-                    off, measured[mask] - predicted, rtol=0, atol=1e-9
-                )
+        torques = compute_generalized_forces(jacobian, measurements.wrench)
+        angles = measurements.joint_angles + torques * compliances
+        angles[:, 2] += offset_of_joint_3
+    return angles
+
+
+def predict_positions(case, fitted, offset_of_joint_3):
+    """Position of each measured target by the chain of the robot alone."""
+    robot = case.campaign.robot
+    measurements = case.campaign.measurements
+    angles = predict_joint_angles(robot, fitted, measurements, offset_of_joint_3)
+    positions = np.empty((len(measurements), 3))
+    for number, target in enumerate(case.campaign.targets):
+        is_of_target = measurements.target == number
+        positions[is_of_target] = compute_poses(
+            robot.chain, angles[is_of_target], robot.chain.point(target.point)
+        )[0]
+    return positions
+
+
+def test_residuals_are_measured_minus_predicted_positions_in_the_order_of_the_rows(
+    cases_and_steps,
+):
+    case, held_out, steps = cases_and_steps
+    _, declared, final = (step.fitted for step in steps)
+    offset = final.estimate.coefficients[-1][0]
+    blocks = list_residual_blocks(case, steps, held_out)
+    assert [block["held_out"].all() for block in blocks] == [False, True]
+    for block, measured_case in zip(blocks, (case, held_out), strict=True):
+        measurements = measured_case.campaign.measurements
+        for name in ("row", "pose", "load", "repeat", "target"):
+            np.testing.assert_array_equal(block[name], getattr(measurements, name))
+        position = np.column_stack([block[axis] for axis in "xyz"])
+        np.testing.assert_array_equal(position, measurements.position)
+        for stage, fitted, offset_of_joint_3 in (
+            ("before", declared, 0.0),
+            ("after", final, offset),
+        ):
+            residual = np.column_stack([block[f"{stage}_d{axis}"] for axis in "xyz"])
+            predicted = predict_positions(measured_case, fitted, offset_of_joint_3)
+            np.testing.assert_allclose(
+                residual, measurements.position - predicted, rtol=0, atol=1e-9
+            )
             assert np.isnan(block[f"{stage}_rx"]).all()
     rows = np.concatenate([block["row"] for block in blocks])
     assert sorted(rows) == list(range(1, len(rows) + 1))
 
 
-def test_figures_before_and_after(made):
-    case, held_out, steps = made
-    found = judged(steps, case, held_out)
-    assert [row["kind"] for row in found.rows] == [step.kind for step in steps]
-    before = found.document["heldout"]["before"]
-    after = found.document["heldout"]["after"]
+def test_the_verdict_compares_held_out_errors_before_and_after(cases_and_steps):
+    case, held_out, steps = cases_and_steps
+    judgement = judge_steps(steps, case, held_out)
+    heldout = judgement.document["heldout"]
+    before = heldout["before"]
+    after = heldout["after"]
+    assert [row["kind"] for row in judgement.rows] == [step.kind for step in steps]
     assert set(before) == set(after) == set(METRICS)
-    assert (
-        before["rms_m"] == found.rows[1]["heldout_rms_m"]
-        and after["rms_m"] == found.rows[2]["heldout_rms_m"]
-    )
+    assert before["rms_m"] == judgement.rows[1]["heldout_rms_m"]
+    assert after["rms_m"] == judgement.rows[2]["heldout_rms_m"]
     assert after["rms_m"] < 0.3 * before["rms_m"]
-    low, high = found.document["heldout"]["reduction_ci95"]
-    assert low < 1 - after["rms_m"] / before["rms_m"] < high
-    assert found.document["heldout"]["poses"] == len(
-        np.unique(held_out.observations.states.pose)
-    )
-    # No joint errs, and a mean of two measurements has half the square of the noise of
-    # one.
-    repeats = held_out.observations.states.repeats[held_out.observations.state]
-    assert found.document["heldout"]["noise_floor_rms_m"] == pytest.approx(
-        6e-5 * np.sqrt((3 / repeats).mean())
-    )
-    (gained,) = (effect["heldout_gain"] for effect in found.document["effects"])
-    assert gained == pytest.approx(1 - after["rms_m"] / before["rms_m"])
-    assert about_errors(found) == []
-    again = judged(steps, case, held_out)
-    assert again.document["heldout"] == found.document["heldout"]
+    reduction = 1 - after["rms_m"] / before["rms_m"]
+    low, high = heldout["reduction_ci95"]
+    assert low < reduction < high
+    states = held_out.observations.states
+    assert heldout["poses"] == len(np.unique(states.pose))
+    # The joints repeat exactly, and the mean of two measurements has half the variance
+    # of one.
+    repeats = states.repeats[held_out.observations.state]
+    floor_m = 6e-5 * np.sqrt((3 / repeats).mean())
+    assert heldout["noise_floor_rms_m"] == pytest.approx(floor_m)
+    (effect,) = judgement.document["effects"]
+    assert effect["heldout_gain"] == pytest.approx(reduction)
+    assert select_warnings_of_errors(judgement) == []
+    assert judge_steps(steps, case, held_out).document["heldout"] == heldout
 
 
-def test_a_step_that_makes_predictions_worse_is_a_warning(made):
-    case, held_out, (bare, declared, final) = made
-    worse = (
-        bare,
+def test_a_step_that_makes_predictions_worse_causes_a_warning(cases_and_steps):
+    case, held_out, (frames, declared, final) = cases_and_steps
+    worse_steps = (
+        frames,
         replace(declared, fitted=final.fitted),
         replace(final, fitted=declared.fitted),
     )
-    said = about_errors(judged(worse, case, held_out))
-    assert any(
-        warning.startswith("the RMS error of the validation poses grew from")
-        for warning in said
-    )
+    warnings = select_warnings_of_errors(judge_steps(worse_steps, case, held_out))
+    beginning = "the RMS error of the validation poses grew from"
+    assert any(warning.startswith(beginning) for warning in warnings)
 
 
-def test_poses_outside_the_fitted_range_are_counted_flagged_and_warned_of(made):
-    """A whole turn brings the joint out of its range and the target nowhere else."""
-    case, held_out, steps = made
-    observations = held_out.observations
-    measurements = held_out.campaign.measurements
-    first = observations.states.pose.min()
-
-    def turned(states):
-        away = (
-            2.0
-            * np.pi
-            * (states.pose == first)[:, None]
-            * (np.arange(case.campaign.robot.joints) == 2)
-        )
-        return replace(states, joint_angles=states.joint_angles + away)
-
-    moved = replace(observations, states=turned(observations.states))
-    campaign = replace(held_out.campaign, measurements=turned(measurements))
-    away = replace(held_out, observations=moved, campaign=campaign)
-    found = judged(steps, case, away)
-    beyond = found.document["heldout"]["outside_range"]
-    poses = found.document["heldout"]["poses"]
-    assert 1 <= beyond["poses"] < poses
-    assert (
-        max(beyond[where]["after"]["rms_m"] for where in ("outside", "inside")) < 1e-3
-    )
-    assert found.document["gross_errors"] == []
-    assert (
-        f"{beyond['poses']} of {poses} validation poses lie outside"
-        in found.document["warnings"][-1]
-    )
-    training, unseen = blocks_of(diagnosis_of(case, steps), away)
-    assert not training["outside_range"].any()
-    assert unseen["outside_range"][unseen["pose"] == first].all()
-    assert len(np.unique(unseen["pose"][unseen["outside_range"]])) == beyond["poses"]
+def turn_joint_3(states, pose):
+    """Turn joint 3 once around in one pose. That brings the joint out of its range, and
+    does not move the target."""
+    joint_angles = states.joint_angles.copy()
+    joint_angles[states.pose == pose, 2] += 2.0 * np.pi
+    return replace(states, joint_angles=joint_angles)
 
 
-def test_a_remainder_is_judged_where_the_campaign_asks_for_one_and_the_data_are_sound(
-    made,
+def test_poses_outside_the_fitted_range_are_counted_flagged_and_warned_of(
+    cases_and_steps,
 ):
-    case, held_out, steps = made
-    found = diagnosis_of(case, steps)
-    assert judge(found, held_out, 1).document["remainder"] is None
-    asked = replace(
-        found,
-        case=replace(
-            case, campaign=replace(case.campaign, remainder="gaussian_process")
+    case, held_out, steps = cases_and_steps
+    observations = held_out.observations
+    campaign = held_out.campaign
+    pose = observations.states.pose.min()
+    turned = replace(
+        held_out,
+        observations=replace(
+            observations, states=turn_joint_3(observations.states, pose)
+        ),
+        campaign=replace(
+            campaign, measurements=turn_joint_3(campaign.measurements, pose)
         ),
     )
-    facts = judge(asked, held_out, 1).document["remainder"]
-    # Two thirds of the error are the offset that the final model has, and nothing
-    # smooth is left.
-    assert facts["physics"] > 0.6 and abs(facts["regression_share"]) < 0.1
-    assert facts["physics"] + facts["regression_share"] + facts[
-        "left"
-    ] == pytest.approx(1.0)
-    fault = CAMPAIGNS["fault of the data"].effects
-    faulty = replace(asked, verdict=replace(asked.verdict, effects=fault))
+    document = judge_steps(steps, case, turned).document
+    by_range = document["heldout"]["outside_range"]
+    count = document["heldout"]["poses"]
+    assert 1 <= by_range["poses"] < count
+    for part in ("outside", "inside"):
+        assert by_range[part]["after"]["rms_m"] < 1e-3
+    assert document["gross_errors"] == []
+    sentence = f"{by_range['poses']} of {count} validation poses lie outside"
+    assert sentence in document["warnings"][-1]
+    training, validation = list_residual_blocks(case, steps, turned)
+    assert not training["outside_range"].any()
+    assert validation["outside_range"][validation["pose"] == pose].all()
+    outside_poses = np.unique(validation["pose"][validation["outside_range"]])
+    assert len(outside_poses) == by_range["poses"]
+
+
+def test_a_regression_is_judged_if_the_campaign_asks_for_one_and_its_data_are_sound(
+    cases_and_steps,
+):
+    case, held_out, steps = cases_and_steps
+    diagnosis = make_diagnosis(case, steps)
+    assert judge(diagnosis, held_out, 1).document["remainder"] is None
+    campaign = replace(case.campaign, remainder="gaussian_process")
+    with_regression = replace(diagnosis, case=replace(case, campaign=campaign))
+    remainder = judge(with_regression, held_out, 1).document["remainder"]
+    # Two thirds of the error are the offset of the final model, and no smooth error is
+    # left.
+    assert remainder["physics"] > 0.6
+    assert abs(remainder["regression_share"]) < 0.1
+    shares = [remainder[name] for name in ("physics", "regression_share", "left")]
+    assert sum(shares) == pytest.approx(1.0)
+    faults = CAMPAIGNS["fault of the data"].effects
+    faulty = replace(
+        with_regression, verdict=replace(with_regression.verdict, effects=faults)
+    )
     assert judge(faulty, held_out, 1).verdict.remainder is None

@@ -1,7 +1,7 @@
-"""From made posteriors to each of the six verdicts, and what was found in the words and
-numbers of verdict.json."""
+"""Posteriors lead to each of the six verdicts, and contradictions are found."""
 
-from dataclasses import replace
+from collections import defaultdict
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -33,200 +33,189 @@ from elastocal.fitting.model import get_joint_compliances
 
 SETTINGS = Settings()
 
-OF_THE_ROBOT = SimpleNamespace(family="geometry")
-OF_THE_SETUP = SimpleNamespace(family="drift")
-UNITS = (
-    make_term("offset", (2,), 0, candidate=OF_THE_ROBOT),
-    make_term("offset", (3,), 1, candidate=OF_THE_ROBOT),
-    make_term("payload", (), 2, candidate=OF_THE_ROBOT),
-    make_term("tilt", (2,), 3, candidate=OF_THE_ROBOT),
+ROBOT_CANDIDATE = SimpleNamespace(family="geometry")
+SETUP_CANDIDATE = SimpleNamespace(family="drift")
+TERMS = (
+    make_term("offset", (2,), 0, candidate=ROBOT_CANDIDATE),
+    make_term("offset", (3,), 1, candidate=ROBOT_CANDIDATE),
+    make_term("payload", (), 2, candidate=ROBOT_CANDIDATE),
+    make_term("tilt", (2,), 3, candidate=ROBOT_CANDIDATE),
     make_term(OTHER, (1,), 4),
     make_term(OTHER, (2,), 5),
 )
 OFFSET_2, OFFSET_3, PAYLOAD, TILT, OTHER_1, OTHER_2 = range(6)
 ROWS = make_rows()
-# An offset of joint 3 and a smooth error of joint 2, each of its plausible size.
-PROBLEM = make_problem(
-    replace(
-        ROWS,
-        residual=ROWS.expected + ROWS.candidates[:, [OFFSET_3, OTHER_2]].sum(axis=1),
-    ),
-    UNITS,
-)[0]
+# The rows contain an offset of joint 3 and a smooth error of joint 2, each of its
+# plausible size.
+CONTRIBUTIONS = ROWS.candidates[:, [OFFSET_3, OTHER_2]].sum(axis=1)
+PROBLEM, _ = make_problem(replace(ROWS, residual=ROWS.expected + CONTRIBUTIONS), TERMS)
 RAISED = Alarm(0.002, 9.0, raised=True)
 SILENT = Alarm(0.4, -1.0, raised=False)
 
 
-def made_posterior(*pairs):
-    """Of models with their probabilities; "nothing" has what is left."""
-    left = 1.0 - sum(probability for _, probability in pairs)
-    listed = sorted([*pairs, ((), left)], key=lambda pair: -pair[1])
+def make_posterior(*pairs):
+    """A posterior of models, each with its probability; "nothing" has the remaining
+    probability."""
+    nothing = 1.0 - sum(probability for _, probability in pairs)
+    ranked = sorted([*pairs, ((), nothing)], key=lambda pair: -pair[1])
     models = tuple(
         ScoredModel(
-            tuple(sorted(units)), float(np.log(p + 1e-12)), np.ones(len(units)), 0.0
+            tuple(sorted(terms)),
+            float(np.log(probability + 1e-12)),
+            np.ones(len(terms)),
+            0.0,
         )
-        for units, p in listed
+        for terms, probability in ranked
     )
-    return Posterior(models, np.array([probability for _, probability in listed]))
+    return Posterior(models, np.array([probability for _, probability in ranked]))
 
 
-def conclusion(*pairs, alarm=RAISED):
-    return conclude(PROBLEM, made_posterior(*pairs), alarm)
+@dataclass(frozen=True)
+class Expected:
+    """A posterior, by its models, and the conclusion from it.
+
+    `models`: probability of each model by the digits of its term indices.
+    """
+
+    models: dict[str, float]
+    verdict: str
+    best: tuple[str, ...]
+    alternatives: dict[str, tuple[str, ...]]
+    probability: float
 
 
-# Verdict, best hypothesis, what is meant instead, probability of what is left open;
-# models by the numbers of their units, with theirs.
-SURE = {"offset": ()}
-BOTH = ("offset", "payload")
-VERDICTS = {
-    "adequate without an alarm, whatever the posterior prefers": (
-        ADEQUATE,
-        (),
-        {},
-        0.1,
-        {"0": 0.9},
+CONCLUSIONS = {
+    "adequate without an alarm, whatever the posterior prefers": Expected(
+        {"0": 0.9}, ADEQUATE, (), {}, 0.1
     ),
-    "named with enough of the probability": (
-        NAMED,
-        ("offset",),
-        SURE,
-        0.85,
-        {"0": 0.6, "1": 0.25, "2": 0.1},
+    "named with enough probability": Expected(
+        {"0": 0.6, "1": 0.25, "2": 0.1}, NAMED, ("offset",), {"offset": ()}, 0.85
     ),
-    # A name needs the probability that is asked for, of which "nothing" has its part,
-    # too.
-    "the alarm decides that something is missing": (
-        CLASS,
-        ("offset",),
-        SURE,
-        0.12,
-        {"0": 0.12, "2": 0.02},
+    # The alarm decides that something is missing. A name still needs a probability, of
+    # which "nothing" has its share.
+    "an alarm against an improbable mechanism": Expected(
+        {"0": 0.12, "2": 0.02}, CLASS, ("offset",), {"offset": ()}, 0.12
     ),
-    "a class of those worth a line": (
-        *(CLASS, ("offset",), {"offset": ("payload", "tilt")}, 0.99),
+    "a class of the mechanisms that are worth a line": Expected(
         {"0": 0.5, "2": 0.3, "3": 0.19, "32": 0.001},
-    ),
-    "a related mechanism beside it": (
-        CLASS,
-        ("offset", OTHER),
-        {"offset": (OTHER,)},
-        1.0,
-        {"15": 0.9, "1": 0.1},
-    ),
-    "a related mechanism instead of it alone": (
         CLASS,
         ("offset",),
-        {"offset": (OTHER,)},
-        1.0,
-        {"1": 0.55, "15": 0.45},
-    ),
-    "several, each with what is meant instead": (
-        SEVERAL,
-        BOTH,
-        SURE | {"payload": ("tilt",)},
+        {"offset": ("payload", "tilt")},
         0.99,
+    ),
+    "a related mechanism in the same model": Expected(
+        {"15": 0.9, "1": 0.1}, CLASS, ("offset", OTHER), {"offset": (OTHER,)}, 1.0
+    ),
+    "a related mechanism in a competing model": Expected(
+        {"1": 0.55, "15": 0.45}, CLASS, ("offset",), {"offset": (OTHER,)}, 1.0
+    ),
+    "several mechanisms, one with an alternative": Expected(
         {"02": 0.7, "03": 0.29},
+        SEVERAL,
+        ("offset", "payload"),
+        {"offset": (), "payload": ("tilt",)},
+        0.99,
     ),
-    "unexplained by the competitor alone": (
-        UNEXPLAINED,
-        (OTHER,),
-        {},
-        0.7,
-        {"4": 0.4, "45": 0.3, "0": 0.3},
+    "unexplained if the discrepancy alone is probable": Expected(
+        {"4": 0.4, "45": 0.3, "0": 0.3}, UNEXPLAINED, (OTHER,), {}, 0.7
     ),
-    "unexplained where nothing is better": (UNEXPLAINED, (), {}, 0.99, {"0": 0.01}),
+    "unexplained if no model is better than nothing": Expected(
+        {"0": 0.01}, UNEXPLAINED, (), {}, 0.99
+    ),
 }
 
 
-@pytest.mark.parametrize("case", VERDICTS)
-def test_the_verdict_is_that_of_least_loss_once_an_alarm_is_raised(case):
-    verdict, best, alternatives, probability, named = VERDICTS[case]
-    models = [(tuple(map(int, units)), share) for units, share in named.items()]
-    found = conclusion(*models, alarm=SILENT if verdict == ADEQUATE else RAISED)
-    assert (found.verdict, found.best.mechanisms) == (verdict, best)
-    assert {
-        name: tuple(there) for name, there in found.alternatives.items()
-    } == alternatives
-    # Without which no headline says how sure it is.
-    assert found.probability == pytest.approx(probability)
-    inclusion = {}
-    for units, probability in models:
-        for name in {UNITS[number].mechanism for number in units}:
-            inclusion[name] = inclusion.get(name, 0.0) + probability
-    assert found.mechanisms == pytest.approx(inclusion)
-    assert list(found.mechanisms.values()) == sorted(
-        found.mechanisms.values(), reverse=True
+@pytest.mark.parametrize("case", CONCLUSIONS)
+def test_the_verdict_has_the_least_expected_loss_once_an_alarm_is_raised(case):
+    expected = CONCLUSIONS[case]
+    models = [(tuple(map(int, key)), share) for key, share in expected.models.items()]
+    alarm = SILENT if expected.verdict == ADEQUATE else RAISED
+    conclusion = conclude(PROBLEM, make_posterior(*models), alarm)
+    assert conclusion.verdict == expected.verdict
+    assert conclusion.best.mechanisms == expected.best
+    assert conclusion.alternatives == expected.alternatives
+    # Headlines state this probability.
+    assert conclusion.probability == pytest.approx(expected.probability)
+    inclusion = defaultdict(float)
+    for terms, probability in models:
+        for name in {TERMS[index].mechanism for index in terms}:
+            inclusion[name] += probability
+    assert conclusion.mechanisms == pytest.approx(inclusion)
+    probabilities = list(conclusion.mechanisms.values())
+    assert probabilities == sorted(probabilities, reverse=True)
+
+
+def test_no_stated_probability_exceeds_one_by_rounding():
+    """The probabilities of the models of a mechanism sum to slightly more than one."""
+    models = (
+        ScoredModel((OFFSET_2,), 9.0, np.ones(1), 0.0),
+        ScoredModel((OFFSET_3,), 9.0, np.ones(1), 0.0),
+        ScoredModel((), 0.0, np.ones(0), 0.0),
     )
+    posterior = Posterior(models, np.array([0.5, 0.5 + 4e-15, 0.0]))
+    conclusion = conclude(PROBLEM, posterior, RAISED)
+    assert conclusion.verdict == NAMED
+    assert conclusion.probability == 1.0
+    assert conclusion.mechanisms["offset"] == 1.0
 
 
 @pytest.mark.parametrize(
-    ("sizes", "mechanisms"),
+    ("scales", "mechanisms"),
     [
         ((1.0, 0.03), ("offset",)),
         ((1.0, 1.0), ("offset", OTHER)),
         ((0.03, 1.0), (OTHER,)),
     ],
 )
-def test_of_a_law_and_a_smooth_error_that_which_adds_little_is_a_part_of_the_other(
-    sizes, mechanisms
+def test_a_mechanism_and_a_smooth_error_count_as_one_if_either_adds_little(
+    scales, mechanisms
 ):
-    """Little is what laws are allowed to be off: of squares, that part which the other
-    cannot make, whatever its size."""
-    posterior = Posterior(
-        (ScoredModel((OFFSET_3, OTHER_2), 1.0, np.array(sizes), 0.0),), np.ones(1)
-    )
-    (law, law_alone), (unknown, unknown_alone) = compute_extra_squares(
-        PROBLEM, posterior.models[0], {"offset"}
-    )
-    small = SETTINGS.law_tolerance**2
-    assert (unknown_alone < small * law, law_alone < small * unknown) == (
-        OTHER not in mechanisms,
-        "offset" not in mechanisms,
-    )
+    """Little is what modelled laws may be off by: the extra sum of squares, which the
+    other one cannot make, whatever the size of the effect."""
+    model = ScoredModel((OFFSET_3, OTHER_2), 1.0, np.array(scales), 0.0)
+    of_law, of_smooth = compute_extra_squares(PROBLEM, model, {"offset"})
+    tolerance = SETTINGS.law_tolerance**2
+    smooth_adds_little = of_smooth.extra < tolerance * of_law.total
+    law_adds_little = of_law.extra < tolerance * of_smooth.total
+    assert smooth_adds_little == (OTHER not in mechanisms)
+    assert law_adds_little == ("offset" not in mechanisms)
+    posterior = Posterior((model,), np.ones(1))
     assert rank_hypotheses(PROBLEM, posterior)[0].mechanisms == mechanisms
 
 
-def test_nothing_is_testable_where_only_the_competitor_is_left():
-    units = UNITS[OTHER_1:]
-    problem = replace(PROBLEM, terms=units)
-    found = conclude(problem, made_posterior(((0,), 0.9)), RAISED)
-    assert found.verdict == NOT_TESTABLE and found.best.mechanisms == ()
+def test_nothing_is_testable_if_only_discrepancies_are_left():
+    problem = replace(PROBLEM, terms=TERMS[OTHER_1:])
+    conclusion = conclude(problem, make_posterior(((0,), 0.9)), RAISED)
+    assert conclusion.verdict == NOT_TESTABLE
+    assert conclusion.best.mechanisms == ()
 
 
-def test_a_set_up_that_holds_still_is_no_test_of_the_robot():
-    """A step between set-ups can be tested on a single pose: without one, nothing was
-    tested; with one, it has a name."""
-    problem = replace(
-        PROBLEM,
-        terms=(
-            make_term("setup_step", (), 0, candidate=OF_THE_SETUP),
-            *UNITS[OTHER_1:],
-        ),
-    )
-    assert (
-        conclude(problem, made_posterior(((0,), 0.1)), SILENT).verdict == NOT_TESTABLE
-    )
-    found = conclude(problem, made_posterior(((0,), 0.9)), RAISED)
-    assert found.verdict == NAMED and found.best.mechanisms == ("setup_step",)
+def test_a_test_of_the_set_up_alone_says_nothing_about_the_robot():
+    """A step of the set-up can be tested on a single pose. If none is found, the robot
+    was not tested; if one is found, it is named."""
+    step = make_term("setup_step", (), 0, candidate=SETUP_CANDIDATE)
+    problem = replace(PROBLEM, terms=(step, *TERMS[OTHER_1:]))
+    silent = conclude(problem, make_posterior(((0,), 0.1)), SILENT)
+    assert silent.verdict == NOT_TESTABLE
+    raised = conclude(problem, make_posterior(((0,), 0.9)), RAISED)
+    assert raised.verdict == NAMED
+    assert raised.best.mechanisms == ("setup_step",)
 
 
-def test_hypotheses_gather_locations_laws_and_sum_to_one():
-    posterior = made_posterior(
+def test_hypotheses_sum_the_probabilities_of_their_models():
+    posterior = make_posterior(
         ((OFFSET_2,), 0.3),
         ((OFFSET_3,), 0.3),
         ((OFFSET_2, OFFSET_3), 0.1),
         ((OTHER_1, OTHER_2), 0.1),
     )
-    found = rank_hypotheses(PROBLEM, posterior)
-    assert [(h.mechanisms, pytest.approx(h.probability)) for h in found] == [
-        (("offset",), 0.7),
-        ((), 0.2),
-        ((OTHER,), 0.1),
-    ]
-    # The most probable of its models stands for each.
-    assert [h.model for h in found] == [0, 2, 4]
-    where = compute_location_probabilities(PROBLEM, posterior, "offset")
-    assert where == pytest.approx({(2,): 4 / 7, (3,): 4 / 7})
+    hypotheses = rank_hypotheses(PROBLEM, posterior)
+    assert [h.mechanisms for h in hypotheses] == [("offset",), (), (OTHER,)]
+    assert [h.probability for h in hypotheses] == pytest.approx([0.7, 0.2, 0.1])
+    # Each hypothesis refers to its most probable model.
+    assert [h.model for h in hypotheses] == [0, 2, 4]
+    locations = compute_location_probabilities(PROBLEM, posterior, "offset")
+    assert locations == pytest.approx({(2,): 4 / 7, (3,): 4 / 7})
 
 
 @pytest.fixture(scope="module")
@@ -234,71 +223,71 @@ def fitted(kuka):
     return planted(kuka, {}, seed=6, poses=8).declared
 
 
-def test_a_mechanism_whose_size_is_wrong_is_stated_with_something_related():
+def test_a_mechanism_of_implausible_size_is_stated_with_a_related_one():
     best = Hypothesis(("joint_offset",), 0.99, 0)
-    sure = Conclusion(
-        "named", (best,), best, {"joint_offset": ()}, {"joint_offset": 0.99}, 0.99
+    named = Conclusion(
+        NAMED, (best,), best, {"joint_offset": ()}, {"joint_offset": 0.99}, 0.99
     )
-    doubted = allow_related_mechanisms(sure, {"joint_offset"})
-    assert (doubted.verdict, doubted.alternatives) == (
-        "class",
-        {"joint_offset": (OTHER,)},
+    doubted = allow_related_mechanisms(named, {"joint_offset"})
+    assert doubted.verdict == CLASS
+    assert doubted.alternatives == {"joint_offset": (OTHER,)}
+    assert allow_related_mechanisms(doubted, {"joint_offset"}) == doubted
+    assert allow_related_mechanisms(named, set()) == named
+    several = replace(
+        named, verdict=SEVERAL, alternatives={"joint_offset": (), "payload": ()}
     )
-    assert (
-        allow_related_mechanisms(doubted, {"joint_offset"}) == doubted
-        and allow_related_mechanisms(sure, set()) == sure
-    )
-    both = replace(
-        sure, verdict="several", alternatives={"joint_offset": (), "payload": ()}
-    )
-    found = allow_related_mechanisms(both, {"payload"})
-    assert (found.verdict, found.alternatives) == (
-        "several",
-        {"joint_offset": (), "payload": (OTHER,)},
-    )
+    doubted = allow_related_mechanisms(several, {"payload"})
+    assert doubted.verdict == SEVERAL
+    assert doubted.alternatives == {"joint_offset": (), "payload": (OTHER,)}
 
 
-def add_noise(fitted, **changes):
+def replace_noise(fitted, **changes):
     return replace(fitted, noise=replace(fitted.noise, **changes))
 
 
 @pytest.mark.parametrize(("factor", "count"), [(4.9, 0), (5.1, 1), (270.0, 1)])
-def test_scatter_far_beyond_the_noise_measured_is_one(fitted, factor, count):
-    left = add_noise(fitted, position_m=factor * fitted.noise.position_m)
-    repeats = replace(fitted.noise, source="repeats")
-    found = find_contradictions(left, repeats, SETTINGS)
-    assert len(found) == count
-    assert all("scatter about the model" in sentence for sentence in found)
-    assert (
-        find_contradictions(left, replace(repeats, source="declared"), SETTINGS) == []
-    )
+def test_residuals_far_beyond_the_measured_noise_contradict_adequacy(
+    fitted, factor, count
+):
+    measured = replace(fitted.noise, source="repeats")
+    scattered = replace_noise(fitted, position_m=factor * fitted.noise.position_m)
+    sentences = find_contradictions(scattered, measured, SETTINGS)
+    assert len(sentences) == count
+    assert all("scatter about the model" in sentence for sentence in sentences)
+    declared = replace(measured, source="declared")
+    assert find_contradictions(scattered, declared, SETTINGS) == []
 
 
 @pytest.mark.parametrize(("pose_rad", "count"), [(4e-4, 0), (1e-3, 1)])
-def test_an_error_of_a_pose_beyond_that_of_drives_is_one(fitted, pose_rad, count):
-    found = find_contradictions(
-        add_noise(fitted, pose_rad=pose_rad), fitted.noise, SETTINGS
-    )
-    assert len(found) == count
-    assert all("1000 µrad" in sentence for sentence in found)
+def test_a_pose_error_larger_than_that_of_drives_contradicts_adequacy(
+    fitted, pose_rad, count
+):
+    final = replace_noise(fitted, pose_rad=pose_rad)
+    sentences = find_contradictions(final, fitted.noise, SETTINGS)
+    assert len(sentences) == count
+    assert all("1000 µrad" in sentence for sentence in sentences)
 
 
 @pytest.mark.parametrize(
-    ("errors", "named"),
+    ("std_errors", "sentences"),
     [
         (2.5, []),
         (4.5, ["the compliance of joint 3 is negative by 4.5 standard errors"]),
     ],
 )
-def test_a_compliance_that_is_negative_beyond_chance_is_one(fitted, errors, named):
-    mine = np.array([owner == "joint_compliance" for owner, _ in fitted.parameters])
-    values = get_joint_compliances(fitted.model, fitted.estimate).copy()
-    values[2] = -errors * np.sqrt(np.diag(fitted.covariance))[mine][2]
+def test_a_compliance_that_is_negative_beyond_chance_contradicts_adequacy(
+    fitted, std_errors, sentences
+):
+    indices = fitted.parameter_indices("joint_compliance")
+    compliances = get_joint_compliances(fitted.model, fitted.estimate).copy()
+    std_error = np.sqrt(np.diag(fitted.covariance))[indices]
+    compliances[2] = -std_errors * std_error[2]
     coefficients = tuple(
-        values if effect.effect == "joint_compliance" else each
-        for effect, each in zip(
+        compliances if effect.effect == "joint_compliance" else values
+        for effect, values in zip(
             fitted.model.effects, fitted.estimate.coefficients, strict=True
         )
     )
-    off = replace(fitted, estimate=replace(fitted.estimate, coefficients=coefficients))
-    assert find_contradictions(off, fitted.noise, SETTINGS) == named
+    estimate = replace(fitted.estimate, coefficients=coefficients)
+    final = replace(fitted, estimate=estimate)
+    assert find_contradictions(final, fitted.noise, SETTINGS) == sentences

@@ -21,7 +21,7 @@ from synthetic import (
 
 from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.conditions import build_conditions, find_offered_needs
-from elastocal.effects.gravity import declared_weight, lever_of_pull
+from elastocal.effects.gravity import declared_weight, find_lever_of_pull
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import (
     compute_displaced_coordinates,
@@ -228,7 +228,7 @@ def test_moments_that_are_a_hundredth_off_still_have_a_place_that_turns_with_the
     moment = np.cross(rotation @ PLACE, force)
     noise = rng.standard_normal((8, 3))
     moment = moment + share * noise * np.linalg.norm(moment) / np.linalg.norm(noise)
-    lever = lever_of_pull(np.concatenate([force, moment], axis=1), rotation)
+    lever = find_lever_of_pull(np.concatenate([force, moment], axis=1), rotation)
     np.testing.assert_allclose(
         lever, 0 * force if share > 0.01 else rotation @ PLACE, atol=4 * share + 1e-9
     )

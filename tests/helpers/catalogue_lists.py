@@ -1,7 +1,7 @@
-"""Lists that are made from the catalogue of effects: the candidates on the FANUC, which
-a test compares with the catalogue, and the table of sizes in docs/method.md.
+"""Lists that are written from the catalogue of effects: the candidates on the FANUC,
+which a test compares with the catalogue, and the table of sizes in docs/method.md.
 
-`make catalogue` writes both. Neither has the effects of other installed packages.
+`make catalogue` writes both. Neither contains effects of other installed packages.
 """
 
 import re
@@ -19,12 +19,15 @@ CANDIDATES = TESTS / "catalogue_on_fanuc.yaml"
 METHOD = ROOT / "docs" / "method.md"
 # The table of sizes, between the lines that begin and end its fold on the page.
 SIZES = re.compile(r"(<details>.*?\n\n)(\|.*?\n)(\n</details>)", re.DOTALL)
-HEAD = "| effect, quantity | size | times | sign | at most | why |\n|---|---|---|---|---|---|\n"
+HEAD = (
+    "| effect, quantity | size | times | sign | at most | why |\n"
+    "|---|---|---|---|---|---|\n"
+)
 
 
 def has_own_test(effect):
-    """Whether an effect has a test that is named after its module and compares it with
-    a closed form."""
+    """Return whether a test file named after the module of an effect compares it with a
+    closed form."""
     module = effect.listed.__module__.rpartition(".")[2]
     test = TESTS / f"test_{module}.py"
     text = test.read_text(encoding="utf-8") if test.is_file() else ""
@@ -32,21 +35,21 @@ def has_own_test(effect):
 
 
 def listed_candidates():
-    """Effects of the catalogue, each with its family and its candidates on the FANUC:
-    their parameters by their keys."""
+    """Return family and candidates on the FANUC of each effect of the catalogue; a
+    candidate has its parameters by its key."""
     sites = equipped(read_robot(ROOT / "config" / "robots" / "fanuc.yaml").chain)
     listed = {}
     for name, effect in list_bundled_effects().items():
-        parameters = {
-            candidate.key: [parameter.name for parameter in candidate.parameters]
-            for candidate in effect.candidates(sites)
-        }
+        parameters = {}
+        for candidate in effect.candidates(sites):
+            names = [parameter.name for parameter in candidate.parameters]
+            parameters[candidate.key] = names
         listed[name] = {"family": effect.family, "candidates": parameters}
     return listed
 
 
 def size_lines(effect):
-    """Rows of the table of sizes for one effect."""
+    """Return the rows of the table of sizes for one effect."""
     signs = {-1: "-", 0: "", 1: "+"}
     return [
         f"| {effect.name}, {size.quantity} | {size.share:g} | {size.of} |"
@@ -69,7 +72,7 @@ def write_lists():
     ]
     page = METHOD.read_text(encoding="utf-8")
     table = HEAD + "".join(lines)
-    page = SIZES.sub(lambda found: f"{found[1]}{table}{found[3]}", page, count=1)
+    page = SIZES.sub(lambda match: f"{match[1]}{table}{match[3]}", page, count=1)
     METHOD.write_text(page, encoding="utf-8")
 
 

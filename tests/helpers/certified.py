@@ -1,5 +1,5 @@
-"""A diagnosed campaign with its reports and the records of its jobs, as a certificate
-is made of it."""
+"""A diagnosed campaign with its reports and the records of its jobs, from which a
+certificate can be made."""
 
 import contextlib
 import shutil
@@ -13,23 +13,36 @@ from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.io.origin import Origin, list_versions
 from elastocal.io.records import JobRecord, digest_inputs, write_records
 
-# A module by which all was made.
+# A module that counts as the origin of all results.
 ENGINE = "src/engine.py"
 TABLES = ("campaign.json", "training.parquet", "held_out.parquet")
-FOUND = ("diagnosis.json", "steps.parquet")
+DIAGNOSIS = ("diagnosis.json", "steps.parquet")
 REPORTS = ("verdict.json", "before_after.csv", "residuals.parquet")
 REPORT = "report.html"
 
 
-# Of which eight judge, as a pass needs.
+# Eight of these poses judge the calibration, as many as a pass requires.
 _PLAN = replace(PLAN, poses=27)
 
 
 def certified_checkout(top, name="made", offset=3e-4, made=None):
-    """A checkout with a campaign that was diagnosed and judged; `made` makes its
-    folder.
+    """Make a checkout with a campaign that was diagnosed and judged.
 
-    Returns folder of the campaign, in `top`.
+    Parameters
+    ----------
+    top : Path
+        Folder of the checkout.
+    name : str
+        Name of the campaign.
+    offset : float
+        Offset of joint 3, rad.
+    made : callable, optional
+        Makes the campaign from (folder, robot, name).
+
+    Returns
+    -------
+    Path
+        Folder of the campaign, in `top`.
     """
     if not (top / "config").exists():
         (top / "config").mkdir()
@@ -60,35 +73,36 @@ def certified_checkout(top, name="made", offset=3e-4, made=None):
 
 
 def record_jobs(name, files, installed=None):
-    """Keep the records of the jobs behind a campaign's report, in the working
+    """Write the records of the jobs behind a campaign's report, in the working
     directory."""
-    tables, found = (
-        [f"results/loop/{name}/{file}" for file in files] for files in (TABLES, FOUND)
-    )
+    tables = [f"results/loop/{name}/{file}" for file in TABLES]
+    diagnosis = [f"results/loop/{name}/{file}" for file in DIAGNOSIS]
     reports = [f"reports/loop/{name}/{file}" for file in REPORTS]
     jobs = {
         "read_campaign": (files, tables),
-        "diagnose_campaign": (tables[:2], found),
-        "judge_campaign": (tables + found[:2], reports),
+        "diagnose_campaign": (tables[:2], diagnosis),
+        "judge_campaign": (tables + diagnosis[:2], reports),
         "compile_loop_report": (
-            tables + found + reports,
+            tables + diagnosis + reports,
             [f"reports/loop/{name}/{REPORT}"],
         ),
     }
     for number, (rule, (inputs, outputs)) in enumerate(jobs.items()):
-        digests, own = digest_inputs([*inputs, ENGINE], None if number else [ENGINE])
+        digests, code_digests = digest_inputs(
+            [*inputs, ENGINE], None if number else [ENGINE]
+        )
         times = f"2026-01-01T00:00:0{number}", f"2026-01-01T00:00:0{number + 1}"
         origin = Origin("c0ffee", "d16e57", 1)
-        here = installed or list_versions(".")
+        versions = installed or list_versions(".")
         write_records(
             JobRecord(
                 rule,
                 {"campaign": name},
                 *times,
                 digests,
-                own,
+                code_digests,
                 tuple(outputs),
                 origin,
-                here,
+                versions,
             )
         )

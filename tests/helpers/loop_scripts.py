@@ -1,5 +1,5 @@
-"""The steps of the loop's rules, run one after the other in this process as Snakemake
-would run them."""
+"""Runs the steps of the loop's rules one after the other in this process, as Snakemake
+would."""
 
 import runpy
 import sys
@@ -16,8 +16,7 @@ ANALYSIS = (
 FIGURES = ("before_after", "arrows", "candidates")
 PARAMS = {"seed": 1, "states": 4, "figures": FIGURES}
 STEPS = (*ANALYSIS, "draw_campaign", "compile_loop_report")
-# Names of the rules' files by which others know them; what is not listed is a Parquet
-# table.
+# Suffixes of files by their names in the rules; all other files are Parquet tables.
 SUFFIXES = dict.fromkeys(("descriptions", "diagnosis", "verdict"), ".json")
 SUFFIXES |= dict.fromkeys(("before_after", "experiment", "candidates"), ".csv") | {
     "report": ".pdf",
@@ -26,19 +25,19 @@ SUFFIXES |= dict.fromkeys(("before_after", "experiment", "candidates"), ".csv") 
 
 
 class Files:
-    """Files of a folder by the names that rules give them: what one script writes the
-    next finds."""
+    """Files of a folder by their names in the rules, so that a script reads what an
+    earlier one has written."""
 
     def __init__(self, folder):
         self.folder = folder
 
     @property
     def figures(self):
-        """Those of the report."""
+        """Paths of the figures of the report."""
         return [(self.folder / f"{figure}.pdf").as_posix() for figure in FIGURES]
 
     def __iter__(self):
-        # Files elsewhere than in a study's folders have no checksums.
+        # Files outside the folders of a study have no checksums.
         return iter(())
 
     def __getattr__(self, name):
@@ -49,12 +48,13 @@ class _Named(dict):
     __getattr__ = dict.__getitem__
 
     def __iter__(self):
-        # Of no job: they have no record.
+        # The job has no record, so it has no inputs to list.
         return iter(())
 
 
 def run_loop(folder, robots, out, steps=STEPS):
-    """Run every step from a campaign's folder to its report; results stand in `out`.
+    """Run every step from a campaign's folder to its report, and write the results to
+    `out`.
 
     Returns `out`, with ``verdict.json`` and ``report.pdf``.
     """
@@ -70,19 +70,16 @@ def run_loop(folder, robots, out, steps=STEPS):
             log=[(out / f"{script}.log").as_posix()],
         )
         if script == "draw_campaign":
-            job.output = _Named(
-                {
-                    kind: [(out / f"{figure}.{kind}").as_posix() for figure in FIGURES]
-                    for kind in ("pdf", "png")
-                }
-            )
+            pdf = [(out / f"{figure}.pdf").as_posix() for figure in FIGURES]
+            png = [(out / f"{figure}.png").as_posix() for figure in FIGURES]
+            job.output = _Named(pdf=pdf, png=png)
         run_script(script, job)
     return out
 
 
 def run_script(script, job):
-    """Run one script of the workflow, or a function of the package, with a job in the
-    place of Snakemake's."""
+    """Run one script of the workflow, or a function of the package, with a job in place
+    of Snakemake's."""
     sys.path.insert(0, SCRIPTS.as_posix())
     for name, value in {"rule": script, "wildcards": {}, "config": CONFIG}.items():
         job.__dict__.setdefault(name, value)

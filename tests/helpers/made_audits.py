@@ -1,5 +1,5 @@
-"""Folders with the few files that a check of an audit reads, made without a run; errors
-planted into them, checksums forged."""
+"""Folders with the few files that a check of an audit reads, made without a run, with
+planted errors and forged checksums."""
 
 import contextlib
 import json
@@ -22,77 +22,102 @@ from elastocal_proof.audit.finished_run import (
     open_philox_stream,
 )
 
-_MADE = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
+_DOCUMENTS = yaml.safe_load(
+    Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")
+)
 ROBOT, STRATEGY, CONFIGURATION = (
-    _MADE[name] for name in ("robot", "strategy", "configuration")
+    _DOCUMENTS[name] for name in ("robot", "strategy", "configuration")
 )
 
 
-def make_run(folder):
-    """Experiments, exact and noisy deflections and estimates of one robot, by
-    pinocchio."""
-    arm = Arm(ROBOT)
-    place = folder / "data/simulated/two"
-    read = ["data_set", "configuration"]
-    experiments = []
-    deflections = []
-    noises = []
-    found = []
-    for data_set in range(4):
-        turns = open_philox_stream(
-            1, "two", "identification/joint angles", data_set
-        ).random((5, 2))
-        normal = open_philox_stream(
-            1, "two", "identification/force", data_set
-        ).standard_normal((5, 3))
-        noise = open_philox_stream(1, "two", "noise/hand", data_set).standard_normal(
-            (5, 6)
-        )
-        matrices = []
-        for k, (q, f) in enumerate(zip(2 * np.pi * turns - np.pi, normal, strict=True)):
-            force = 500 * f / np.linalg.norm(f)
-            wrench = np.concatenate([force, np.cross([0, 0.5, 0], force)])
-            still, moved = (
-                arm.pose(at, "hand")
-                for at in (q, arm.loaded(arm.springs, q, wrench, 1)[0])
-            )
-            experiments.append([data_set, k, *q, *wrench])
-            deflections.append(
-                [*(moved[0] - still[0]), *pin.log3(moved[1] @ still[1].T)]
-            )
-            noises.append(1e-4 * noise[k])
-            matrices.append(arm.regressor(q, wrench, "hand"))
-            seen = np.concatenate((np.array(deflections) + noises)[-len(matrices) :])
-            found.append(
-                [
-                    data_set,
-                    k + 1,
-                    *np.linalg.lstsq(np.concatenate(matrices), seen, rcond=None)[0],
-                ]
-            )
-    tables = {
-        "experiments": pd.DataFrame(experiments, columns=[*read, "q1", "q2", *WRENCH])
-    }
-    for name, moved in (
-        ("ideal", np.array(deflections)),
-        ("100um/measured", np.array(deflections) + noises),
-    ):
-        tables[name] = tables["experiments"][read].assign(
-            point="hand", **dict(zip(COMPONENTS, moved.T, strict=True))
-        )
-    (place / "100um").mkdir(parents=True)
-    for name, table in tables.items():
-        table.to_parquet(place / f"{name}.parquet")
-    (folder / "results/identified/two/100um").mkdir(parents=True)
-    names = ["data_set", "length", "compliance_1", "compliance_2"]
-    pd.DataFrame(found, columns=names).to_parquet(
-        folder / "results/identified/two/100um/hand.parquet"
+DATA_SETS = 4
+CONFIGURATIONS = 5
+POINT = "hand"
+
+
+def draw_numbers(purpose, data_set):
+    """Open the stream of random numbers for one purpose of one data set."""
+    return open_philox_stream(1, "two", purpose, data_set)
+
+
+def deflect(arm, joint_angles, wrench):
+    """Return translation and rotation vector of the point under a load."""
+    loaded_angles = arm.loaded(arm.springs, joint_angles, wrench, 1)[0]
+    position, rotation = arm.pose(joint_angles, POINT)
+    loaded_position, loaded_rotation = arm.pose(loaded_angles, POINT)
+    return [*(loaded_position - position), *pin.log3(loaded_rotation @ rotation.T)]
+
+
+def simulate_data_set(arm, data_set):
+    """Simulate the configurations of one data set.
+
+    Returns lists of the same length: joint angles and wrenches, exact deflections,
+    noise, and estimates from the configurations so far.
+    """
+    shape = CONFIGURATIONS, 2
+    uniform = draw_numbers("identification/joint angles", data_set).random(shape)
+    normal = draw_numbers("identification/force", data_set).standard_normal(
+        (CONFIGURATIONS, 3)
     )
-    return FinishedRun(folder, CONFIGURATION, {"two": ROBOT}, {"hand": STRATEGY}, 20)
+    noise = 1e-4 * draw_numbers(f"noise/{POINT}", data_set).standard_normal(
+        (CONFIGURATIONS, 6)
+    )
+    states = []
+    deflections = []
+    regressors = []
+    estimates = []
+    for joint_angles, direction in zip(
+        2 * np.pi * uniform - np.pi, normal, strict=True
+    ):
+        force = 500 * direction / np.linalg.norm(direction)
+        wrench = np.concatenate([force, np.cross([0, 0.5, 0], force)])
+        states.append([*joint_angles, *wrench])
+        deflections.append(deflect(arm, joint_angles, wrench))
+        regressors.append(arm.regressor(joint_angles, wrench, POINT))
+        measured = np.array(deflections) + noise[: len(deflections)]
+        estimates.append(
+            np.linalg.lstsq(
+                np.concatenate(regressors), np.concatenate(measured), rcond=None
+            )[0]
+        )
+    return states, deflections, noise, estimates
+
+
+def make_run(folder):
+    """Write experiments, exact and noisy deflections and estimates of one robot, by
+    pinocchio; return the finished run."""
+    arm = Arm(ROBOT)
+    data_sets = [simulate_data_set(arm, data_set) for data_set in range(DATA_SETS)]
+    states, deflections, noise, estimates = (
+        np.concatenate(arrays) for arrays in zip(*data_sets, strict=True)
+    )
+    numbers = np.arange(DATA_SETS).repeat(CONFIGURATIONS)
+    configurations = np.tile(np.arange(CONFIGURATIONS), DATA_SETS)
+    keys = pd.DataFrame({"data_set": numbers, "configuration": configurations})
+    names = ["q1", "q2", *WRENCH]
+    data = folder / "data/simulated/two"
+    (data / "100um").mkdir(parents=True)
+    keys.join(pd.DataFrame(states, columns=names)).to_parquet(
+        data / "experiments.parquet"
+    )
+    for name, values in (
+        ("ideal", deflections),
+        ("100um/measured", deflections + noise),
+    ):
+        columns = dict(zip(COMPONENTS, values.T, strict=True))
+        keys.assign(point=POINT, **columns).to_parquet(data / f"{name}.parquet")
+    results = folder / "results/identified/two/100um"
+    results.mkdir(parents=True)
+    lengths = keys[["data_set"]].assign(length=configurations + 1)
+    compliances = ["compliance_1", "compliance_2"]
+    lengths.join(pd.DataFrame(estimates, columns=compliances)).to_parquet(
+        results / f"{POINT}.parquet"
+    )
+    return FinishedRun(folder, CONFIGURATION, {"two": ROBOT}, {POINT: STRATEGY}, 20)
 
 
 def forge(folder, file):
-    """Record a file's checksum as if a job had written it."""
+    """Record the checksum of a file as if a job had written it."""
     with contextlib.chdir(folder):
         write_records(
             JobRecord(
@@ -102,20 +127,24 @@ def forge(folder, file):
 
 
 @contextlib.contextmanager
-def altered(folder, file, at, change):
-    """The block finds a value of a document (by keys) or table (by column and row)
-    changed, the checksum of the file forged."""
+def altered(folder, file, address, change):
+    """Change a value of a file, and forge the checksum of the file, during a block.
+
+    The address of a value is a list of keys in a document, or column and row in a
+    table.
+    """
     paths = [folder / file, folder / f"results/records/{file}.json"]
     before = [path.read_bytes() if path.is_file() else None for path in paths]
     if file.endswith(".json"):
         document = inner = json.loads(before[0])
-        *way, last = at
-        for key in way:
+        *parents, last = address
+        for key in parents:
             inner = inner[key]
         inner[last] = change(inner[last])
         paths[0].write_text(json.dumps(document), encoding="utf-8")
     else:
-        table, (column, row) = pq.ParquetFile(paths[0]).read(), at
+        table = pq.ParquetFile(paths[0]).read()
+        column, row = address
         values = table.column(column).to_numpy().copy()
         values[row] = change(values[row])
         field = table.schema.get_field_index(column)
@@ -136,5 +165,5 @@ def altered(folder, file, at, change):
 
 
 def failed(findings):
-    """What of the findings does not hold."""
+    """Return what was checked by the findings that do not hold."""
     return [finding.checked for finding in findings if not finding.holds]

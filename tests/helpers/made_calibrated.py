@@ -1,5 +1,5 @@
-"""Calibrated robots made up for tests: effects of plausible size, and what a fit would
-say of them."""
+"""Synthetic calibrated robots: effects of plausible size, and the covariance that a fit
+would estimate."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from elastocal.effects.gravity import declared_weight
 from elastocal.fitting.model import Estimate, Model, list_parameters
 from elastocal.mechanics.sites import build_sites
 
-# What a good arm has, of each family that an afternoon finds.
+# Effects of a good arm, of each family that an afternoon of measurements identifies.
 USUAL = (
     *(f"joint_offset@{joint}" for joint in range(2, 6)),
     *(f"link_geometry@{joint}" for joint in range(1, 6)),
@@ -23,33 +23,42 @@ USUAL = (
 
 
 def plain_model(robot, *keys, identified=True):
-    """The model of a robot at its foot, with springs and these candidates; no targets
-    yet."""
+    """Make the model of a robot in its base frame without targets, with joint
+    compliances, declared masses and the candidates of these keys."""
     sites = build_sites(robot)
-    found = candidates_on(sites)
-    springs = (joint_compliance(sites),) if identified else ()
-    weight = (declared_weight(sites),) if sites.masses else ()
+    candidates = candidates_on(sites)
+    effects = [candidates[key] for key in keys]
+    if sites.masses:
+        effects.insert(0, declared_weight(sites))
+    if identified:
+        effects.insert(0, joint_compliance(sites))
     return Model(
         sites,
-        (),
-        False,
-        6,
-        robot.compliance,
-        (*springs, *weight, *(found[key] for key in keys)),
+        targets=(),
+        fitted_frames=False,
+        rows=6,
+        nominal_compliance=robot.compliance,
+        effects=tuple(effects),
     )
+
+
+def shape_starts(effect):
+    """Return the starts of the shape parameters of an effect."""
+    return np.array([shape.start for shape in effect.shapes])
 
 
 def plain_estimate(model, coefficients, shapes=None):
-    """Values of the effects of such a model."""
-    shapes = shapes or tuple(
-        np.array([shape.start for shape in effect.shapes]) for effect in model.effects
-    )
-    none = np.zeros((0, 3))
+    """Make an estimate with these coefficients of the effects; shape parameters are at
+    their starts by default."""
+    if not shapes:
+        starts = [shape_starts(effect) for effect in model.effects]
+        shapes = tuple(starts)
+    no_targets = np.zeros((0, 3))
     return Estimate(
         (0,),
         np.eye(3)[None],
         np.zeros((1, 3)),
-        none,
+        no_targets,
         np.zeros((0, 3, 3)),
         tuple(coefficients),
         shapes,
@@ -59,19 +68,17 @@ def plain_estimate(model, coefficients, shapes=None):
 def make_calibrated_robot(
     robot, *keys, seed=0, size=0.3, relative_std=0.02, identified=True, noise=None
 ):
-    """A calibrated robot with every parameter at up to `size` of its plausible size,
-    known to a share of that."""
+    """Make a calibrated robot with every parameter at up to `size` times its plausible
+    size, and a standard error of `relative_std` times that size."""
     rng = np.random.default_rng(seed)
     model = plain_model(robot, *keys, identified=identified)
     coefficients = []
     for effect in model.effects:
         plausible = np.array([parameter.plausible for parameter in effect.parameters])
         drawn = size * plausible * rng.uniform(-1, 1, len(plausible))
-        coefficients.append(
-            robot.compliance * (1 + 0.1 * drawn / plausible)
-            if effect.effect == "joint_compliance"
-            else drawn
-        )
+        if effect.effect == "joint_compliance":
+            drawn = robot.compliance * (1 + 0.1 * drawn / plausible)
+        coefficients.append(drawn)
     estimate = plain_estimate(model, coefficients)
     sizes = np.array(
         [parameter.plausible for _, parameter in list_parameters(model, estimate)]

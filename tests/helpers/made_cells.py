@@ -1,4 +1,4 @@
-"""A small campaign's folder that tests spoil before they read it."""
+"""The folder of a small campaign that tests change before they read it."""
 
 import csv
 from dataclasses import fields
@@ -22,9 +22,9 @@ LOADS = 2
 REPEATS = 2
 
 
-def measured():
-    """Columns of a campaign: each pose unloaded and loaded, twice, two targets; numbers
-    that cannot be confused."""
+def make_columns():
+    """Make the columns of a campaign: each pose is measured unloaded and loaded, with
+    two repeats of two targets. All numbers differ."""
     rng = np.random.default_rng(3)
     angles = rng.uniform(-0.9, 0.7, (POSES, 3))
     rows = []
@@ -33,10 +33,11 @@ def measured():
             wrench = load * (100.0 + np.arange(6) + pose)
             for repeat in range(REPEATS):
                 for target in ("A", "B"):
-                    at = angles[pose] + rng.uniform(-1e-4, 1e-4, 3)
-                    seen = rng.uniform(-1, 1, 6)
+                    reported = angles[pose] + rng.uniform(-1e-4, 1e-4, 3)
+                    measured = rng.uniform(-1, 1, 6)
                     approach = rng.choice([-1, 1], 3)
-                    cells = (pose, load, repeat, target, *at, *wrench, *seen, *approach)
+                    cells = (pose, load, repeat, target, *reported, *wrench)
+                    cells = (*cells, *measured, *approach)
                     rows.append((*cells, 60.0 * len(rows), 20.0 + 0.01 * len(rows)))
     names = [
         "pose",
@@ -57,41 +58,42 @@ def measured():
 
 
 class Cell:
-    """A campaign's folder that a test spoils before it reads it."""
+    """The folder of a campaign that a test changes before it reads it."""
 
     def __init__(self, folder):
         self.robots = folder / "robots"
         self.folder = folder / "cell7"
         self.document = dict(DOCUMENT)
         self.arm = dict(ARM)
-        self.table = measured()
+        self.table = make_columns()
 
     def without(self, *names):
+        """Remove columns of the measurements."""
         for name in names:
             del self.table[name]
 
     def keep(self, rows):
-        """Take these rows alone, counted from 0, in this order."""
-        self.table = {
-            name: [column[row] for row in rows] for name, column in self.table.items()
-        }
+        """Keep only these rows, counted from 0, in this order."""
+        for name, column in self.table.items():
+            self.table[name] = [column[row] for row in rows]
 
     def repeat_as_session_7(self):
-        """The same rows again as another session, with targets of its own."""
+        """Add the same rows as another session, with its own targets."""
         count = len(self.table["pose"])
         targets = self.document["targets"]
         names = self.table["target"] + [f"{name}2" for name in self.table["target"]]
-        again = {name: 2 * column for name, column in self.table.items()}
-        self.table = again | {"session": count * [0] + count * [7], "target": names}
+        doubled = {name: 2 * column for name, column in self.table.items()}
+        self.table = doubled | {"session": count * [0] + count * [7], "target": names}
         self.document["targets"] = targets | {
             f"{name}2": target for name, target in targets.items()
         }
 
     def spoil(self, row, column, cell):
-        """Put something into a cell; rows are counted from 1 as in messages."""
+        """Replace a cell; rows are counted from 1, as in messages."""
         self.table[column][row - 1] = cell
 
     def write(self, kind="csv", separator=","):
+        """Write the folder and the robots next to it."""
         self.folder.mkdir(parents=True, exist_ok=True)
         self.robots.mkdir(exist_ok=True)
         (self.robots / "planar.yaml").write_text(yaml.safe_dump(ARM), encoding="utf-8")
@@ -112,11 +114,12 @@ class Cell:
             writer.writerows(zip(*self.table.values(), strict=True))
 
     def read(self, **arguments):
+        """Write the folder, and read the campaign from it."""
         self.write()
         return read_campaign(self.open(), **arguments)
 
     def open(self):
-        """The folder as it was written."""
+        """Open the folder as it was written."""
         return read_campaign_folder(self.folder, self.robots)
 
     @property
@@ -128,12 +131,12 @@ class Cell:
         return (self.folder / "measurements.csv").as_posix()
 
 
-def assert_same(one, other):
-    """The same measurements, value for value."""
+def assert_same(measurements, expected):
+    """Check that two measurements are equal, value for value."""
     for field in fields(Measurements):
-        left = getattr(one, field.name)
-        right = getattr(other, field.name)
-        assert (left is None) == (right is None), field.name
-        if left is not None:
-            assert left.dtype == right.dtype, field.name
-            np.testing.assert_array_equal(left, right, err_msg=field.name)
+        values = getattr(measurements, field.name)
+        expected_values = getattr(expected, field.name)
+        assert (values is None) == (expected_values is None), field.name
+        if values is not None:
+            assert values.dtype == expected_values.dtype, field.name
+            np.testing.assert_array_equal(values, expected_values, err_msg=field.name)

@@ -1,5 +1,5 @@
-"""Tables and verdicts of the loop made up for figures and reports, no robot behind
-them, and what a report states of them."""
+"""Synthetic tables and verdicts of the loop for figures and reports, and the facts that
+a report states about them."""
 
 from copy import deepcopy
 from pathlib import Path
@@ -20,7 +20,7 @@ from elastocal.io.typed_json import from_document, to_document
 from elastocal.report.loop_facts import collect_loop_facts
 from elastocal.verdict import DataFault, Effect, Probabilities, Verdict
 
-# What of verdict.json is always the same.
+# Entries of verdict.json that are the same in all verdicts.
 DATA = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
 FAMILIES = (
     "geometry",
@@ -34,8 +34,8 @@ FAMILIES = (
 
 
 def residual_table(poses=30, repeats=1):
-    """Columns of a residuals table; joint 2 makes a sine of 300 µm in the vertical that
-    goes with what is found."""
+    """Make the columns of a residuals table. Joint 2 causes a sine of 300 µm in the
+    vertical direction, which the correction removes."""
     rng = np.random.default_rng(0)
     targets = 2
     count = poses * targets * repeats * 2
@@ -59,22 +59,22 @@ def residual_table(poses=30, repeats=1):
         name: 500.0 * load * (name == "fz")
         for name in ("fx", "fy", "fz", "mx", "my", "mz")
     }
-    place = rng.uniform([0.5, -1, 0.2], [2, 1, 2], (poses, 3))[pose]
-    table |= dict(zip("xyz", place.T, strict=True))
+    position = rng.uniform([0.5, -1, 0.2], [2, 1, 2], (poses, 3))[pose]
+    table |= dict(zip("xyz", position.T, strict=True))
     noise = 20e-6 * rng.normal(size=(count, 3))
     wave = 300e-6 * np.sin(angles[:, 1])
     for stage, size in (("before", 1.0), ("after", 0.0)):
-        off = noise + size * wave[:, None] * [0, 0, 1]
+        error = noise + size * wave[:, None] * [0, 0, 1]
         table |= {
-            f"{stage}_d{axis}": off[:, number] for number, axis in enumerate("xyz")
+            f"{stage}_d{axis}": error[:, number] for number, axis in enumerate("xyz")
         }
         table |= {f"{stage}_r{axis}": np.full(count, np.nan) for axis in "xyz"}
     return table
 
 
 def candidate_table(count=30, chosen=1):
-    """Columns of a candidates table: by falling Bayes factor, the last cannot be
-    tested."""
+    """Make the columns of a candidates table, in the order of falling Bayes factors; the
+    last ones cannot be tested."""
     total = count + 5
     names = [f"effect_{number}@{number % 6 + 1}" for number in range(total)]
     tested = np.arange(total) < count
@@ -97,29 +97,29 @@ def candidate_table(count=30, chosen=1):
 
 
 def probabilities(sets=None, alarm_p_value=0.002):
-    """Probabilities of verdict.json; `sets` of mechanisms with their locations, each
-    with its probability."""
+    """Make the probabilities of verdict.json from pairs of a set of mechanisms, with
+    their locations, and its probability."""
     sets = sets or [
         ({"lost_motion": ["joint 3"]}, 0.94),
         ({"joint_tilt": ["joint 2"]}, 0.05),
         ({}, 0.004),
     ]
     listed = [
-        {"mechanisms": list(where), "probability": value, "locations": where}
-        for where, value in sets
+        {"mechanisms": list(locations), "probability": value, "locations": locations}
+        for locations, value in sets
     ]
     mechanisms = {}
-    for where, value in sets:
-        for name in where:
+    for locations, value in sets:
+        for name in locations:
             mechanisms[name] = mechanisms.get(name, 0.0) + value
-    nothing = sum(value for where, value in sets if not where)
+    nothing = sum(value for locations, value in sets if not locations)
     facts = {"nothing": nothing, "stated": sets[0][1], "alarm_p_value": alarm_p_value}
     document = facts | {"mechanisms": mechanisms, "sets": listed}
     return from_document(Probabilities, document, "made up")
 
 
 def step_rows(effects=("lost_motion",), largest_m=3e-4):
-    """Rows of before_after.csv, each model better than the one before."""
+    """Make rows of before_after.csv; each model is better than the one before."""
     named = [("frames and targets", "frames"), ("declared model", "declared")]
     named += [(f"with {name}", "effect") for name in effects]
     rows = []
@@ -143,7 +143,7 @@ def step_rows(effects=("lost_motion",), largest_m=3e-4):
 
 
 def experiment_rows(count=10):
-    """Rows of next_experiment.csv."""
+    """Make rows of next_experiment.csv."""
     return [
         DATA["experiment"]
         | {"pose": n, "separation": 10.0 + n, "resolved": 0.5 + 0.04 * n}
@@ -161,7 +161,7 @@ def effect_entry(
     adopted=True,
     cost_m=8.5e-5,
 ):
-    """An effect of a verdict."""
+    """Make an effect of a verdict."""
     names = [f"{member} {parameter}" for member in members for parameter in parameters]
     locations = (
         locations or [(f"joint {joint}", 1.0) for joint in joints] or [("", 1.0)]
@@ -174,13 +174,14 @@ def effect_entry(
     }
     given |= {
         "parameters": [
-            DATA["parameter"] | {"name": each, "value": 1.2e-4 * (1 + n)}
-            for n, each in enumerate(names)
+            DATA["parameter"] | {"name": parameter_name, "value": 1.2e-4 * (1 + n)}
+            for n, parameter_name in enumerate(names)
         ]
     }
     given |= {
         "locations": [
-            {"location": where, "probability": value} for where, value in locations
+            {"location": location, "probability": value}
+            for location, value in locations
         ]
     }
     judged = {"adopted": True} if adopted else {"adopted": False, "heldout_gain": None}
@@ -199,7 +200,7 @@ def make_verdict(
     reduction=(0.15, 0.32),
     remainder=None,
 ):
-    """A verdict with made-up errors."""
+    """Make a verdict with synthetic errors."""
     is_faulty = any(isinstance(effect, DataFault) for effect in effects)
     is_adopted = any(effect.adopted for effect in effects)
     before = DATA["errors"]
@@ -249,14 +250,14 @@ REMAINDER = DATA["remainder"] | {
     "outside": 3,
     "half_width_m": {"within": 1.0e-4, "outside": 4.0e-4},
 }
-TWO_PLACES = [("joint 3", 0.8), ("joint 5", 0.2)]
+TWO_LOCATIONS = [("joint 3", 0.8), ("joint 5", 0.2)]
 CAMPAIGNS = {
     "adequate": make_verdict(
         ADEQUATE, sets=[({}, 0.97), ({"lost_motion": ["joint 3"]}, 0.02)]
     ),
     "named": make_verdict(NAMED, [effect_entry()]),
     "named, location uncertain": make_verdict(
-        NAMED, [effect_entry(locations=TWO_PLACES)]
+        NAMED, [effect_entry(locations=TWO_LOCATIONS)]
     ),
     "class": make_verdict(
         CLASS, [effect_entry(alternatives=["joint_tilt", "link_elasticity"])]
@@ -294,11 +295,11 @@ CAMPAIGNS = {
 
 
 def facts_of(verdict, **changed):
-    """Facts of the report of a verdict, with tables that fit it where none are
-    given."""
-    found = [effect.name for effect in verdict.effects if effect.adopted]
+    """Collect the facts of the report of a verdict; tables that are not given are made
+    to fit it."""
+    adopted = [effect.name for effect in verdict.effects if effect.adopted]
     given = {
-        "steps": step_rows(effects=found),
+        "steps": step_rows(effects=adopted),
         "experiment": [],
         "table": residual_table(),
         "descriptions": DATA["descriptions"],
@@ -310,5 +311,5 @@ def facts_of(verdict, **changed):
 
 
 def plainly(text):
-    """A text with plain blanks where lines must not end."""
+    """Return a text with plain blanks instead of non-breaking ones."""
     return text.replace("\u00a0", " ")

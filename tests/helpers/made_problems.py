@@ -1,5 +1,5 @@
-"""Linear problems of the diagnosing engine, small enough to be worked out densely, and
-what that gives."""
+"""Linear problems of the diagnosis that are small enough for dense matrices, and their
+dense covariances."""
 
 from dataclasses import dataclass, replace
 
@@ -19,10 +19,20 @@ from elastocal.fitting.linearization import FactoredSensitivities
 
 @dataclass(frozen=True)
 class Rows:
-    """Whitened rows of a made campaign; `white` has them as `products_of` takes them.
+    """Whitened rows of a synthetic campaign.
 
-    `declared`, `candidates` (R, P), (R, K), `residual` (R,), `jacobian` (R, n), `pose`
-    (R,) of int, `prior_std`, `present` (P,).
+    Attributes
+    ----------
+    declared : ndarray (R, P)
+        Columns of the declared parameters.
+    candidates : ndarray (R, K)
+        Columns of the candidates.
+    residual : ndarray (R,)
+    jacobian : ndarray (R, n)
+        Columns of the joint angles, in which the measurements of a pose share an error.
+    pose : ndarray of int (R,)
+    prior_std, present : ndarray (P,)
+        Prior standard deviations of the declared parameters, and their present values.
     """
 
     declared: np.ndarray
@@ -34,44 +44,47 @@ class Rows:
     present: np.ndarray
 
     def white(self):
-        """Observations of one row and one state each: every column displaces a
-        coordinate of its own, by one."""
+        """Return the rows as the library takes them: each is an observation of its own
+        state, and each column displaces its own coordinate by one."""
         rows, columns = self.candidates.shape
-        declared, jacobian, candidates = (
-            part[:, None] for part in (self.declared, self.jacobian, self.candidates)
-        )
-        made = FactoredSensitivities.of(
+        candidates = FactoredSensitivities.of(
             [{column: np.ones(rows)} for column in range(columns)],
-            candidates,
+            self.candidates[:, None],
             np.arange(rows),
             rows,
         )
-        return WhitenedRows(declared, made, self.residual[:, None], jacobian, self.pose)
+        return WhitenedRows(
+            self.declared[:, None],
+            candidates,
+            self.residual[:, None],
+            self.jacobian[:, None],
+            self.pose,
+        )
 
     @property
     def products(self):
         return compute_cross_products(self.white(), self.prior_std, self.present)
 
     def covariance(self, tau):
-        """Sigma = I + tau^2 J J', dense."""
-        together = self.pose[:, None] == self.pose
-        return (
-            np.eye(len(self.pose)) + tau**2 * self.jacobian @ self.jacobian.T * together
-        )
+        """Compute the dense covariance I + tau^2 J J' within poses."""
+        same_pose = self.pose[:, None] == self.pose
+        pose_error = tau**2 * self.jacobian @ self.jacobian.T * same_pose
+        return np.eye(len(self.pose)) + pose_error
 
     def marginal_covariance(self, tau):
-        """The same with the declared parameters integrated over their prior."""
+        """Compute the covariance with the declared parameters integrated over their
+        prior."""
         return (
             self.covariance(tau) + (self.declared * self.prior_std**2) @ self.declared.T
         )
 
     @property
     def expected(self):
-        """Mean of the residual, from the prior means of the declared parameters."""
+        """Mean of the residual if the declared parameters are at their prior means."""
         return -self.declared @ self.present
 
     def drawn(self, rng, tau=0.0):
-        """The same with a residual drawn anew: nothing is missing, and declared
+        """Return the rows with a new residual: no effect is missing, and the declared
         parameters are at their prior means."""
         common = tau * rng.standard_normal(
             (self.pose.max() + 1, self.jacobian.shape[1])
@@ -85,7 +98,7 @@ class Rows:
 def make_rows(
     seed=0, poses=8, size=(3, 9), declared=4, candidates=6, joints=2, prior=10.0
 ):
-    """Rows of poses of unequal sizes, in no order."""
+    """Draw rows of poses of different sizes, in random order."""
     rng = np.random.default_rng(seed)
     pose = np.repeat(
         np.arange(poses), rng.integers(size[0], size[1], poses, endpoint=True)
@@ -115,14 +128,12 @@ def make_term(
     smallest=0,
     law=OWN,
 ):
-    """A unit of some columns, each of plausible size one."""
+    """Make a model term of some columns, each of plausible size one."""
     columns = np.atleast_1d(columns)
     signs = np.full(len(columns), signs, int)
-    other = (
-        Discrepancy(location, law, 1.0, (), len(columns))
-        if mechanism == OTHER
-        else None
-    )
+    discrepancy = None
+    if mechanism == OTHER:
+        discrepancy = Discrepancy(location, law, 1.0, (), len(columns))
     return ModelTerm(
         mechanism,
         location,
@@ -132,19 +143,19 @@ def make_term(
         np.ones(len(columns)),
         signs,
         log_prior,
-        other,
+        discrepancy,
         smallest,
     )
 
 
 def make_problem(rows, units, settings=None, tau=None):
-    """The problem of some rows, at the engine's own sizes of the pose error by default,
-    and its products."""
+    """Make the search problem of some rows, by default with the pose errors that the
+    diagnosis tries; return it with the cross products of the rows."""
     settings = settings or Settings()
     products = rows.products
     if tau is None:
-        # In standard errors with which the measurements of one pose determine a joint
-        # angle.
+        # The unit is the standard error of a joint angle from the measurements of one
+        # pose.
         information = (
             np.median(np.bincount(rows.pose, (rows.jacobian**2).sum(axis=1)))
             / rows.jacobian.shape[1]

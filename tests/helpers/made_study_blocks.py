@@ -1,5 +1,5 @@
-"""Blocks of the study's tables, made by its own steps from random experiments, and
-regressors by pinocchio to judge them by."""
+"""Blocks of the study's tables, made by the steps of the study from random experiments,
+and regressors by pinocchio to compare with."""
 
 import numpy as np
 from support import PinocchioPoint, without_tool
@@ -27,7 +27,7 @@ WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 def experiments_of(
     robot, sets=5, configurations=4, purpose="identification", key="kuka"
 ):
-    """Blocks of the experiments table."""
+    """Draw blocks of the experiments table."""
     design = RandomDesign(robot.chain, robot.joint_limits, PAPER, key)
     blocks = split_data_sets(sets)
     return [
@@ -40,7 +40,8 @@ def experiments_of(
 
 
 def as_read(blocks):
-    """Blocks as a table gives them back: the name of the point in every row."""
+    """Yield blocks as they are read from a table, with the name of the point in every
+    row."""
     for block in blocks:
         yield block | {
             "point": np.full(len(block["data_set"]), block["point"], dtype=object)
@@ -48,16 +49,18 @@ def as_read(blocks):
 
 
 def deflections_of(robot, experiments, noise=0.0, at="end_effector", key="kuka"):
+    """Simulate the deflections of each measuring point, as lists of blocks."""
     blocks = as_read(simulate_blocks(experiments, robot, at))
     if noise:
         blocks = as_read(add_noise_to_blocks(blocks, key, 1, noise))
-    found = {point.name: [] for point in robot.chain.points}
+    blocks_of_points = {point.name: [] for point in robot.chain.points}
     for block in blocks:
-        found[block["point"][0]].append(block)
-    return found
+        blocks_of_points[block["point"][0]].append(block)
+    return blocks_of_points
 
 
 def identified(robot, strategy, experiments, deflections, rows=6, at="end_effector"):
+    """Identify compliances by a strategy, as one table."""
     needed = {name: deflections[name] for name in strategy.points}
     blocks = identify_blocks(
         pair_blocks(experiments, needed), robot.chain, strategy, rows, at
@@ -66,41 +69,45 @@ def identified(robot, strategy, experiments, deflections, rows=6, at="end_effect
 
 
 def joined(blocks):
-    return {
-        name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]
-    }
+    """Join blocks of a table to one."""
+    columns = {}
+    for name in blocks[0]:
+        columns[name] = np.concatenate([block[name] for block in blocks])
+    return columns
 
 
 def compliances(table, length):
-    """(sets, 6) of one length."""
+    """Return the compliances of one length, ndarray (sets, 6)."""
     return np.column_stack([table[f"compliance_{j}"] for j in range(1, 7)])[
         table["length"] == length
     ]
 
 
 def judge(robot, at="end_effector"):
+    """Make the validation set of a robot."""
     experiments = experiments_of(robot, 1, CONFIGURATIONS_OF_THE_TEST, purpose="test")
-    (seen,) = deflections_of(robot, experiments, at=at)[robot.chain.end_effector.name]
+    (deflections,) = deflections_of(robot, experiments, at=at)[
+        robot.chain.end_effector.name
+    ]
     return make_validation_set(
-        robot, unpack_experiments(experiments[0]), unpack_deflections(seen), at
+        robot, unpack_experiments(experiments[0]), unpack_deflections(deflections), at
     )
 
 
 def pinocchio_regressors(chain, block, name, at="end_effector", rows=6):
-    """Columns J_j (J^T w)_j of equation 10 for each row of a block of experiments,
-    ndarray (R, rows, n)."""
+    """Compute the columns J_j (J^T w)_j of equation 10 for each row of a block of
+    experiments, ndarray (R, rows, n)."""
     angles = np.column_stack([block[f"q{j + 1}"] for j in range(chain.coordinates)])
     wrench = np.column_stack([block[component] for component in WRENCH])
     loaded = (
         without_tool(chain.end_effector) if at == "end_effector" else chain.point(name)
     )
-    seen, pushed = (
-        PinocchioPoint(chain, point) for point in (chain.point(name), loaded)
-    )
-    jacobian = np.array([seen.pose_and_jacobian(q)[2] for q in angles])
+    measured_point = PinocchioPoint(chain, chain.point(name))
+    loaded_point = PinocchioPoint(chain, loaded)
+    jacobian = np.array([measured_point.pose_and_jacobian(q)[2] for q in angles])
     torques = np.array(
         [
-            pushed.pose_and_jacobian(q)[2].T @ force
+            loaded_point.pose_and_jacobian(q)[2].T @ force
             for q, force in zip(angles, wrench, strict=True)
         ]
     )

@@ -1,4 +1,4 @@
-"""URDF files by hand, and where pinocchio takes their links to be."""
+"""URDF files written by hand, and the poses of their links by pinocchio."""
 
 from xml.sax.saxutils import quoteattr
 
@@ -20,7 +20,7 @@ angle = st.one_of(
 )
 shift = st.tuples(*[st.one_of(st.just(0.0), st.floats(-0.3, 0.3))] * 3)
 kinds = st.sampled_from(["revolute", "continuous", "prismatic", "fixed"])
-# Chains: kind, origin, roll-pitch-yaw, axis, mass, centre, place of a part beside.
+# Chains: kind, origin, roll-pitch-yaw, axis, mass, centre, position of a side link.
 segments = st.lists(
     st.tuples(
         kinds,
@@ -48,7 +48,8 @@ def link(name, mass=None, centre=(0.0, 0.0, 0.0), rpy=(0.0, 0.0, 0.0)):
     if mass is None:
         return f"<link name={quoteattr(name)}/>"
     inertia = '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/>'
-    return f'<link name={quoteattr(name)}><inertial>{origin(centre, rpy)}<mass value="{mass!r}"/>{inertia}</inertial></link>'
+    inertial = f'{origin(centre, rpy)}<mass value="{mass!r}"/>{inertia}'
+    return f"<link name={quoteattr(name)}><inertial>{inertial}</inertial></link>"
 
 
 def joint(
@@ -96,7 +97,7 @@ def written(folder, *parts, **more):
 
 
 class Pinocchio:
-    """A URDF by pinocchio; joints are set by name, all others are at zero."""
+    """A URDF in pinocchio. Joints are set by name; all others are at zero."""
 
     def __init__(self, path):
         self.model = pin.buildModelFromXML(path.read_text(encoding="utf-8"))
@@ -107,25 +108,25 @@ class Pinocchio:
         q = pin.neutral(self.model)
         for name, value in values.items():
             number = self.model.getJointId(name)
-            place = self.model.joints[number].idx_q
+            index = self.model.joints[number].idx_q
             if self.model.joints[number].nq == 2:
-                q[place : place + 2] = np.cos(value), np.sin(value)
+                q[index : index + 2] = np.cos(value), np.sin(value)
             else:
-                q[place] = value
+                q[index] = value
         return q
 
     def pose(self, base, tip, values):
-        """Of one link in the axes of another: position (3,) and rotation (3, 3)."""
+        """Return position (3,) and rotation (3, 3) of one link in the axes of another."""
         pin.framesForwardKinematics(self.model, self.data, self.configuration(values))
-        at = [
+        base_placement, tip_placement = (
             self.data.oMf[self.model.getFrameId(name, pin.FrameType.BODY)]
             for name in (base, tip)
-        ]
-        found = at[0].inverse() * at[1]
-        return found.translation, found.rotation
+        )
+        relative = base_placement.inverse() * tip_placement
+        return relative.translation, relative.rotation
 
     def weight(self, values, names):
-        """What the weight of the links does to joints, N m or N."""
+        """Return the load of joints by the weight of the links, N m or N."""
         torque = pin.computeGeneralizedGravity(
             self.model, self.data, self.configuration(values)
         )
@@ -140,18 +141,24 @@ class Pinocchio:
 def assert_same_poses(
     robot, path, base, tip, set_joints=None, count=8, within=1e-9, names=None
 ):
-    """To a nanometre and a nanoradian, at what the controller reports. `set_joints`
-    maps a state to values by joint name."""
+    """Check the poses of a robot against pinocchio, to a nanometre and a nanoradian by
+    default, at random joint angles that a controller reports.
+
+    `set_joints` maps the values of joints by name to those of further joints.
+    """
     by_pinocchio = Pinocchio(path)
     rng = np.random.default_rng(5)
     angles = rng.uniform(-np.pi, np.pi, (count, robot.joints))
     position, rotation = compute_poses(
         robot.chain, robot.model_angles(angles), robot.chain.end_effector
     )
-    for state, own, turned in zip(angles, position, rotation, strict=True):
+    for index, state in enumerate(angles):
         values = dict(zip(names or robot.joint_names, state, strict=True))
-        there, axes = by_pinocchio.pose(
-            base, tip, values | (set_joints(values) if set_joints else {})
+        if set_joints:
+            values |= set_joints(values)
+        expected_position, expected_rotation = by_pinocchio.pose(base, tip, values)
+        np.testing.assert_allclose(
+            position[index], expected_position, rtol=0, atol=within
         )
-        np.testing.assert_allclose(own, there, rtol=0, atol=within)
-        assert np.linalg.norm(pin.log3(axes.T @ turned)) < within
+        error = pin.log3(expected_rotation.T @ rotation[index])
+        assert np.linalg.norm(error) < within

@@ -1,5 +1,5 @@
-"""Campaigns made up for tests: states, models, estimates and what a tracker would read
-of them."""
+"""Synthetic states, models and estimates, and the measurements that a tracker would
+take of them."""
 
 from dataclasses import replace
 
@@ -31,8 +31,8 @@ NOISE = Noise("declared", 60e-6, 60e-6, np.zeros(6))
 
 
 def make_states(joints, count, seed=0, force=500.0, span=1.2, sessions=1, repeats=1):
-    """States anywhere, each under a load of its own, with everything that an effect may
-    ask for."""
+    """Draw states, each under its own load, with every quantity that an effect may
+    depend on."""
     rng = np.random.default_rng(seed)
     wrench = np.concatenate(
         [rng.standard_normal((count, 3)), 0.3 * rng.standard_normal((count, 3))], axis=1
@@ -52,21 +52,17 @@ def make_states(joints, count, seed=0, force=500.0, span=1.2, sessions=1, repeat
 
 
 def equipped(holder):
-    """Sites of a robot or a chain with a compensator beside its shoulder and a known
-    gear: no effect is out of place there."""
-    robot = (
-        holder
-        if isinstance(holder, Robot)
-        else robot_on(holder, np.zeros(holder.coordinates))
-    )
+    """Return the sites of a robot or a chain, with a compensator at its shoulder and a
+    known gear ratio, so that every effect has candidates there."""
+    robot = holder
+    if not isinstance(holder, Robot):
+        robot = robot_on(holder, np.zeros(holder.coordinates))
     sites = build_sites(robot)
     if sites.compensator is None and sites.shoulder is not None:
         sites = replace(sites, compensator=Compensator(sites.shoulder + 1, "spring"))
-    return (
-        sites
-        if sites.gear_ratio
-        else replace(sites, gear_ratio=(101.0, *[None] * (sites.joints - 1)))
-    )
+    if not sites.gear_ratio:
+        sites = replace(sites, gear_ratio=(101.0, *[None] * (sites.joints - 1)))
+    return sites
 
 
 def make_model(
@@ -78,77 +74,80 @@ def make_model(
     effects=(),
     identified=False,
 ):
-    """A model of a chain or a robot; its targets are unknown offsets from the last
-    measuring point by default."""
+    """Make a model of a chain or a robot.
+
+    By default it has one target at an unknown offset from the last measuring point.
+    `identified` adds the joint compliances to the effects.
+    """
     sites = equipped(holder)
-    targets = (
-        (Target("A", sites.chain.end_effector.name, None),)
-        if targets is None
-        else targets
-    )
-    compliance = (
-        1e-6 * np.arange(1, sites.joints + 1)
-        if compliance is None
-        else np.asarray(compliance)
-    )
-    springs = (joint_compliance(sites),) if identified else ()
-    weight = (declared_weight(sites),) if sites.masses else ()
+    if targets is None:
+        targets = [Target("A", sites.chain.end_effector.name, None)]
+    if compliance is None:
+        compliance = 1e-6 * np.arange(1, sites.joints + 1)
+    declared = []
+    if identified:
+        declared.append(joint_compliance(sites))
+    if sites.masses:
+        declared.append(declared_weight(sites))
     return Model(
         sites,
         tuple(targets),
         fitted_frames,
         rows,
-        compliance,
-        (*springs, *weight, *effects),
+        np.asarray(compliance),
+        (*declared, *effects),
     )
+
+
+def draw_target_rotation(model, target, rng):
+    """Draw the rotation of a target that measures orientations and whose rotation is
+    not known; otherwise return the known rotation, or none."""
+    if model.rows == 6 and target.rotation is None:
+        return Rotation.random(rng=rng).as_matrix()
+    return Rotation.from_rotvec(target.rotation or np.zeros(3)).as_matrix()
+
+
+def draw_coefficients(effect, rng, size):
+    """Draw the coefficients of an effect, up to `size` times their plausible sizes."""
+    plausible = np.array([parameter.plausible for parameter in effect.parameters])
+    return size * plausible * rng.uniform(-1, 1, len(plausible))
 
 
 def make_estimate(model, sessions=(0,), seed=0, size=0.3):
-    """Frames and targets anywhere; every parameter of an effect at up to `size` times
-    its plausible size."""
+    """Draw an estimate with frames and targets anywhere.
+
+    Coefficients are at most `size` times their plausible sizes; shape parameters are at
+    their starts.
+    """
     rng = np.random.default_rng(seed)
     count = len(sessions)
-    fitted = model.fitted_frames
-    frames = (
-        Rotation.random(count, rng=rng).as_matrix()
-        if fitted
-        else np.tile(np.eye(3), (count, 1, 1))
-    )
+    frame_rotation = np.tile(np.eye(3), (count, 1, 1))
+    if model.fitted_frames:
+        frame_rotation = Rotation.random(count, rng=rng).as_matrix()
     offsets = []
-    turns = []
+    rotations = []
     for target in model.targets:
-        unknown = target.offset_m is None
-        offsets.append(rng.uniform(-0.1, 0.1, 3) if unknown else target.offset_m)
-        known = target.rotation is not None or model.rows == 3
-        turns.append(
-            (
-                Rotation.from_rotvec(target.rotation or np.zeros(3))
-                if known
-                else Rotation.random(rng=rng)
-            ).as_matrix()
-        )
-    sizes = [
-        np.array([parameter.plausible for parameter in effect.parameters])
-        for effect in model.effects
-    ]
+        offset_m = target.offset_m
+        offsets.append(rng.uniform(-0.1, 0.1, 3) if offset_m is None else offset_m)
+        rotations.append(draw_target_rotation(model, target, rng))
+    frame_position = rng.uniform(-2, 2, (count, 3)) * model.fitted_frames
+    shapes = []
+    for effect in model.effects:
+        shapes.append(np.array([shape.start for shape in effect.shapes]))
     return Estimate(
         tuple(sessions),
-        frames,
-        rng.uniform(-2, 2, (count, 3)) * fitted,
+        frame_rotation,
+        frame_position,
         np.array(offsets),
-        np.array(turns),
-        tuple(
-            size * plausible * rng.uniform(-1, 1, len(plausible)) for plausible in sizes
-        ),
-        tuple(
-            np.array([shape.start for shape in effect.shapes])
-            for effect in model.effects
-        ),
+        np.array(rotations),
+        tuple(draw_coefficients(effect, rng, size) for effect in model.effects),
+        tuple(shapes),
     )
 
 
 def observe_exactly(model, estimate, states):
-    """Every target in every state, read without noise in the frame of its session."""
+    """Observe every target in every state without noise, in the frame of its
+    session."""
     state = np.repeat(np.arange(len(states)), len(model.targets))
     target = np.tile(np.arange(len(model.targets)), len(states))
     blank = Observations(states, state, target, np.zeros((len(state), 3)), None)
@@ -156,52 +155,56 @@ def observe_exactly(model, estimate, states):
         model, estimate, blank, evaluate_conditions(model, estimate, states)
     )
     session = np.searchsorted(estimate.sessions, states.session[state])
-    turn = estimate.frame_rotation[session]
-    shift = estimate.frame_position[session]
-    position = (turn @ position[..., None])[..., 0] + shift
-    return Observations(
-        states, state, target, position, turn @ rotation if model.rows == 6 else None
-    )
+    frame_rotation = estimate.frame_rotation[session]
+    frame_position = estimate.frame_position[session]
+    position = (frame_rotation @ position[..., None])[..., 0] + frame_position
+    rotation = frame_rotation @ rotation if model.rows == 6 else None
+    return Observations(states, state, target, position, rotation)
 
 
 def add_noise(observations, rng, position_m=60e-6, orientation_rad=60e-6):
-    """The same observations, each component of each wrong by itself."""
+    """Return the observations with independent noise in each component."""
     position = observations.position + position_m * rng.standard_normal(
         observations.position.shape
     )
     rotation = observations.rotation
     if rotation is not None:
-        turn = Rotation.from_rotvec(
+        noise = Rotation.from_rotvec(
             orientation_rad * rng.standard_normal((len(position), 3))
         )
-        rotation = turn.as_matrix() @ rotation
+        rotation = noise.as_matrix() @ rotation
     return replace(observations, position=position, rotation=rotation)
 
 
-def fill_measurements(pose, joint_angles, position, **others):
-    """Measurements without loads and repeats, of one target, and with nothing that is
-    optional, but for what is given."""
-    none = np.zeros(len(pose), np.int32)
+def fill_measurements(pose, joint_angles, position, **columns):
+    """Build measurements with some columns given.
+
+    By default they have one target, no loads and no repeats, and no optional column.
+    """
     count = len(pose)
-    usual = {
-        "session": none,
-        "load": none,
-        "repeat": none,
-        "target": none,
+    zero = np.zeros(count, np.int32)
+    defaults = {
+        "session": zero,
+        "load": zero,
+        "repeat": zero,
+        "target": zero,
         "wrench": np.zeros((count, 6)),
+        "row": np.arange(1, count + 1, dtype=np.int32),
+        "rotation_vector": None,
+        "approach": None,
+        "time_s": None,
+        "temperature_c": None,
     }
-    usual |= dict.fromkeys(("rotation_vector", "approach", "time_s", "temperature_c"))
-    given = usual | {"row": np.arange(1, count + 1, dtype=np.int32)} | others
     return Measurements(
-        pose=pose, joint_angles=joint_angles, position=position, **given
+        pose=pose, joint_angles=joint_angles, position=position, **(defaults | columns)
     )
 
 
 def make_measurements(
     model, rng, poses_count, repeats, sensor_m, joint_rad, sensor_rad=0.0
 ):
-    """Repeats of poses in base axes: the joints come to rest anew at each approach, the
-    sensor errs at each measurement."""
+    """Simulate repeats of poses in base axes: the joints come to rest anew at each
+    approach, and each measurement has its own sensor noise."""
     joints = model.sites.joints
     targets = len(model.targets)
     pose = np.repeat(np.arange(poses_count), repeats * targets)
@@ -215,27 +218,28 @@ def make_measurements(
     coordinates[:, :joints] = commanded + rest
     position = np.empty((len(pose), 3))
     rotation = np.empty((len(pose), 3, 3))
-    for index, one in enumerate(model.targets):
-        point = replace(model.sites.chain.point(one.point), offset_m=one.offset_m)
+    for index, mounted in enumerate(model.targets):
+        point = replace(
+            model.sites.chain.point(mounted.point), offset_m=mounted.offset_m
+        )
         mask = target == index
         position[mask], rotation[mask] = compute_poses(
             model.sites.chain, coordinates[mask], point
         )
-    turned = Rotation.from_rotvec(
-        sensor_rad * rng.standard_normal((len(pose), 3))
-    ) * Rotation.from_matrix(rotation)
+    noise = Rotation.from_rotvec(sensor_rad * rng.standard_normal((len(pose), 3)))
+    measured_rotation = noise * Rotation.from_matrix(rotation)
     return fill_measurements(
         pose=pose,
         repeat=repeat,
         target=target,
         joint_angles=commanded,
         position=position + sensor_m * rng.standard_normal(position.shape),
-        rotation_vector=turned.as_rotvec() if model.rows == 6 else None,
+        rotation_vector=measured_rotation.as_rotvec() if model.rows == 6 else None,
     )
 
 
 def conditions_on(holder, states, compliance=None):
-    """Conditions of some states on a chain or a robot."""
+    """Return the conditions of some states on a chain or a robot."""
     sites = equipped(holder)
     compliance = (
         1e-6 * np.arange(1, sites.joints + 1) if compliance is None else compliance
@@ -244,13 +248,13 @@ def conditions_on(holder, states, compliance=None):
 
 
 def find_candidate(holder, key):
-    """One candidate of the catalogue, on a chain or a robot."""
+    """Return one candidate of the catalogue on a chain or a robot."""
     return candidates_on(equipped(holder))[key]
 
 
 def displacements(candidate, conditions, *shapes):
-    """What each parameter of a candidate makes, on every coordinate of the sites:
-    ndarray (D, S, C)."""
+    """Return the displacement by each parameter of a candidate of every coordinate of
+    the sites: ndarray (D, S, C)."""
     laws = candidate.displacement(conditions, *shapes)
     assert len(laws) == len(candidate.parameters)
     dense = np.zeros((len(laws), *conditions.load.shape))
@@ -261,23 +265,21 @@ def displacements(candidate, conditions, *shapes):
 
 
 def small_steps(model, estimate):
-    """A step of each parameter for which a central difference loses nothing to
-    curvature or rounding."""
+    """Return a step of each parameter that is small enough for the curvature and large
+    enough for the rounding of a central difference."""
     shapes = {
         (effect.key, shape.name) for effect in model.effects for shape in effect.shapes
     }
-    listed = list_parameters(model, estimate)
-    return np.array(
-        [
-            (1e-4 if (owner, p.name) in shapes else 1e-3) * p.plausible
-            for owner, p in listed
-        ]
-    )
+    steps = []
+    for owner, parameter in list_parameters(model, estimate):
+        is_shape = (owner, parameter.name) in shapes
+        steps.append((1e-4 if is_shape else 1e-3) * parameter.plausible)
+    return np.array(steps)
 
 
 def slopes(model, estimate, observations, conditions, steps):
-    """Changes of the prediction per step, by central differences of the residuals:
-    ndarray (M, rows, number of steps)."""
+    """Return the change of the prediction by each step, by central differences of the
+    residuals: ndarray (M, rows, number of steps)."""
     columns = []
     for step in steps:
         ahead, behind = (

@@ -6,8 +6,8 @@ import pytest
 
 from elastocal.io import atomic_writes
 from elastocal.io.atomic_writes import (
-    atomic_write,
     remove_partials,
+    write_atomically,
     write_text,
     write_together,
 )
@@ -18,7 +18,7 @@ def test_a_file_appears_when_it_is_complete_and_replaces_the_old_one(tmp_path, b
     path = tmp_path / "one.txt"
     if before:
         path.write_text(before, encoding="utf-8")
-    with atomic_write(str(path)) as partial:
+    with write_atomically(str(path)) as partial:
         Path(partial).write_text("half", encoding="utf-8")
         assert (
             Path(partial).parent == tmp_path
@@ -33,10 +33,10 @@ def test_a_file_appears_when_it_is_complete_and_replaces_the_old_one(tmp_path, b
 def test_a_block_that_fails_leaves_the_old_file_and_no_other(tmp_path, error):
     path = tmp_path / "one.txt"
     path.write_text("old", encoding="utf-8")
-    with pytest.raises(error), atomic_write(path) as partial:
+    with pytest.raises(error), write_atomically(path) as partial:
         Path(partial).write_text("half", encoding="utf-8")
         raise error
-    with pytest.raises(FileNotFoundError), atomic_write(path):
+    with pytest.raises(FileNotFoundError), write_atomically(path):
         pass
     assert path.read_text(encoding="utf-8") == "old" and list(tmp_path.iterdir()) == [
         path
@@ -48,14 +48,14 @@ def test_partial_files_have_random_names_and_are_opened_exclusively(
 ):
     names = set()
     for _ in range(20):
-        with atomic_write(tmp_path / "one.txt") as partial:
+        with write_atomically(tmp_path / "one.txt") as partial:
             names.add(partial)
             Path(partial).write_text("x")
     assert len(names) == 20
     monkeypatch.setattr(atomic_writes.secrets, "token_hex", lambda _: "foreseen")
     (tmp_path / "victim").write_text("mine")
     (tmp_path / "one.txt.foreseen.partial").symlink_to(tmp_path / "victim")
-    with pytest.raises(FileExistsError), atomic_write(tmp_path / "one.txt"):
+    with pytest.raises(FileExistsError), write_atomically(tmp_path / "one.txt"):
         raise AssertionError("never written")
     with pytest.raises(FileExistsError), write_together(tmp_path, ["one.txt"]):
         raise AssertionError("never written")

@@ -47,7 +47,7 @@ def test_every_pose_is_held_out_once_in_folds_of_one_size_and_blocks_are_neighbo
         assert counts[0] == 0 and len(counts) == 6 and np.ptp(counts[1:]) <= 1
     seen = build_measurements(data.columns)
     angles = seen.joint_angles[np.unique(seen.pose, return_index=True)[1]]
-    block = data.dealt["blocks"]
+    block = data.folds["blocks"]
     apart = np.linalg.norm(np.exp(1j * angles[:, None]) - np.exp(1j * angles), axis=2)
     same = block[:, None] == block
     assert apart[same & ~np.eye(24, dtype=bool)].mean() < 0.95 * apart[~same].mean()
@@ -58,16 +58,16 @@ def test_a_data_set_comes_back_from_its_files(data, tmp_path):
     write_table(
         tmp_path / "seen.parquet", build_measurements_schema(6), [data.columns], {}
     )
-    write_table(tmp_path / "folds.parquet", FOLDS, [data.dealt], {})
+    write_table(tmp_path / "folds.parquet", FOLDS, [data.folds], {})
     found = load_data_set(
         tmp_path / "campaign.json",
         tmp_path / "seen.parquet",
         tmp_path / "folds.parquet",
     )
-    for mine, read in ((data.columns, found.columns), (data.dealt, found.dealt)):
+    for mine, read in ((data.columns, found.columns), (data.folds, found.folds)):
         for name, values in mine.items():
             np.testing.assert_array_equal(read[name], values)
-    assert len(found.case().observations.states) == 24
+    assert len(found.build_case().observations.states) == 24
 
 
 @pytest.mark.parametrize("split", ["random", "blocks"])
@@ -157,7 +157,7 @@ def test_each_observation_has_its_pose_target_and_residual(data, tmp_path):
     write_table(tmp_path / "entries.parquet", ENTRIES, [fixed | columns], {})
     found = read_table(tmp_path / "entries.parquet", ENTRIES)
     np.testing.assert_array_equal(residual(found), residual(columns))
-    assert set(found["pose"]) == set(data.dealt["pose"][data.dealt["blocks"] == fold])
+    assert set(found["pose"]) == set(data.folds["pose"][data.folds["blocks"] == fold])
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""Robots and campaigns for the plant's tests."""
+"""Robots and campaigns for the tests of the simulated robot."""
 
 from dataclasses import replace
 
@@ -13,14 +13,14 @@ from elastocal_proof.plant.sizing import NoncentralityModel
 
 
 @pytest.fixture(scope="session", params=["kuka", "fanuc", "abb", "gp180", "iiwa14"])
-def name(request):
-    """Each robot of the blind proof in turn."""
+def robot_name(request):
+    """Each robot of the blind benchmark in turn."""
     return request.param
 
 
 @pytest.fixture(scope="session")
-def arm(name):
-    return read_arm(ROBOTS / f"{name}.yaml")
+def arm(robot_name):
+    return read_arm(ROBOTS / f"{robot_name}.yaml")
 
 
 @pytest.fixture(scope="session")
@@ -34,29 +34,28 @@ def fanuc_specimen(fanuc_arm):
 
 
 @pytest.fixture(scope="session")
-def weightless(fanuc_arm):
-    """The same, of an arm that weighs nothing: what only its loads and defects do."""
+def weightless_specimen(fanuc_arm):
+    """The same specimen without weight, so that only loads and defects deflect it."""
     return draw_specimen(fanuc_arm, 4, weighs=False)
 
 
 @pytest.fixture(scope="session")
-def small():
-    """A short campaign."""
+def short_design():
+    """Design of a short campaign."""
     return Design(poses=8, held_out=2, repeated_poses=3, repeats=2)
 
 
 @pytest.fixture(scope="session")
-def schedule(fanuc_arm, small):
-    return draw_schedule(fanuc_arm, small, 2)
+def schedule(fanuc_arm, short_design):
+    return draw_schedule(fanuc_arm, short_design, 2)
 
 
 @pytest.fixture(scope="session")
-def yardstick(fanuc_specimen, schedule):
-    # As slow as a campaign of usual length, in which a stand that is knocked is so
+def noncentrality(fanuc_specimen, schedule):
+    # The campaign takes as long as a usual one, so that a knock of the stand falls
     # between two of its poses.
-    return NoncentralityModel(
-        fanuc_specimen, replace(schedule, time_s=3.0 * schedule.time_s)
-    )
+    slow_schedule = replace(schedule, time_s=3.0 * schedule.time_s)
+    return NoncentralityModel(fanuc_specimen, slow_schedule)
 
 
 @pytest.fixture

@@ -1,5 +1,5 @@
-"""Defects as a whole: each kind changes the measurements as its size says, by its seed,
-where it is put and nowhere else."""
+"""Every kind of defect changes the measurements according to its size, at its location
+only."""
 
 from dataclasses import replace
 
@@ -9,42 +9,43 @@ from catalogue_lists import has_own_test
 from elastocal.effects.catalogue import list_bundled_effects
 from elastocal_proof.plant.kinds import KINDS, OUTSIDE, apply_defects, draw_defect
 
-NAMED = sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE))
+CATALOGUED = {kind for kind in KINDS if not kind.startswith(OUTSIDE)}
+# A base that stands elsewhere than declared is no defect of the robot. The tracker of a
+# setting observes it there.
+SIMULATED_EFFECTS = CATALOGUED | {"base_placement"}
 
 
 def test_every_effect_of_the_catalogue_can_be_a_defect():
-    # A base that stands elsewhere than declared is none of the robot: the tracker of a
-    # setting sees it there.
     effects = list_bundled_effects()
-    assert {*NAMED, "base_placement"} <= set(effects)
-    # The blind proof has no defect of a new effect until the plant has its law.
-    for name in set(effects) - {*NAMED, "base_placement"}:
+    assert set(effects) >= SIMULATED_EFFECTS
+    # The blind benchmark has no defect of a new effect until the simulation has its law.
+    for name in set(effects) - SIMULATED_EFFECTS:
         assert has_own_test(effects[name]), name
-    # Else what the catalogue finds rightly would count as a wrong name.
-    assert not {kind.removeprefix(OUTSIDE) for kind in set(KINDS) - set(NAMED)} & set(
-        list_bundled_effects()
-    )
+
+
+def test_no_defect_outside_the_catalogue_has_the_name_of_an_effect():
+    # Otherwise a correct finding would count as a wrong name.
+    outside = {kind.removeprefix(OUTSIDE) for kind in set(KINDS) - CATALOGUED}
+    assert not outside & set(list_bundled_effects())
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
-def test_a_defect_of_no_size_leaves_the_robot_as_it_was_and_a_plausible_one_does_not(
-    yardstick, fanuc_specimen, kind
+def test_a_plausible_defect_is_visible_and_a_tiny_one_is_not(
+    noncentrality, fanuc_specimen, kind
 ):
     defect = draw_defect(kind, fanuc_specimen.arm, 3)
-    tiny = replace(defect, size=1e-9 * defect.size)
-    small, signal = (
-        yardstick.compute_noncentralities(apply_defects(fanuc_specimen, [each]))
-        for each in (tiny, defect)
+    tiny_defect = replace(defect, size=1e-9 * defect.size)
+    tiny, plausible = (
+        noncentrality.compute_noncentralities(apply_defects(fanuc_specimen, [applied]))
+        for applied in (tiny_defect, defect)
     )
-    assert (
-        small["raw"] < 1e-9
-        and signal["raw"] > 0.1
-        and 0 <= signal["retained"] <= signal["raw"] * (1 + 1e-9)
-    )
+    assert tiny["raw"] < 1e-9
+    assert plausible["raw"] > 0.1
+    assert 0 <= plausible["retained"] <= plausible["raw"] * (1 + 1e-9)
 
 
-def test_weight_is_of_the_upper_arm_of_the_forearm_or_of_all_links_by_the_joints_that_it_turns(
+def test_weights_that_load_different_joints_are_upper_arm_forearm_and_all_links(
     fanuc_arm,
 ):
-    upper, fore, everything = KINDS["link_weight"].locations(fanuc_arm)
-    assert upper == (2,) and fore == (2, 3) and everything == (2, 3, 4, 5)
+    locations = KINDS["link_weight"].locations(fanuc_arm)
+    assert locations == [(2,), (2, 3), (2, 3, 4, 5)]

@@ -1,8 +1,7 @@
-"""What each defect does to a campaign stays what it was: other libraries agreed with
-these numbers before they were kept.
+"""Every defect keeps its effect on a campaign.
 
-Where a law is meant to change, write them anew: `GOLDEN=write python -m pytest
-tests/plant/test_laws.py`.
+Other libraries agreed with these numbers before they were recorded. If a law is meant
+to change, record them again: `GOLDEN=write python -m pytest tests/plant/test_laws.py`.
 """
 
 import os
@@ -21,48 +20,50 @@ GOLDEN = ROBOTS.parents[1] / "tests/golden/plant_defects.csv"
 DESIGN = Design(
     poses=5, held_out=1, repeats=2, repeated_poses=2, approach_each_load=False
 )
-KEY = ["arm", "kind", "seed"]
 
 
-def digest(array):
-    """A sum in which each number has a weight of its own, so that no sign and no order
-    is lost."""
+def compute_digest(array):
+    """A sum in which each number has a weight of its own, so that it depends on all
+    signs and on the order."""
     return float(array.ravel() @ np.cos(1.0 + np.arange(array.size)))
 
 
-def row_of(name, kind, seed):
+def make_row(name, kind, seed):
+    """Digests of what a defect does to a robot."""
     arm = read_arm(ROBOTS / f"{name}.yaml")
     schedule = draw_schedule(arm, DESIGN, seed)
-    # As slow as a campaign of usual length, in which a stand that is knocked is so
+    # The campaign takes as long as a usual one, so that a knock of the stand falls
     # between two of its poses.
     schedule = replace(schedule, time_s=5.0 * schedule.time_s)
     robot = draw_specimen(arm, seed)
     defect = draw_defect(kind, arm, seed)
-    good, bad = (
-        simulate_poses(one, schedule) for one in (robot, apply_defects(robot, [defect]))
+    position, rotation = simulate_poses(robot, schedule)
+    defective_position, defective_rotation = simulate_poses(
+        apply_defects(robot, [defect]), schedule
     )
-    turn = to_rotation_vector(bad[1] @ np.swapaxes(good[1], -1, -2))
-    known = np.array([*defect.on(robot)[1].values()], float)
-    found = {
-        "shift_m": digest(bad[0] - good[0]),
-        "turn_rad": digest(turn),
-        "parameters": digest(known),
+    turn = to_rotation_vector(defective_rotation @ np.swapaxes(rotation, -1, -2))
+    parameters = np.array([*defect.on(robot)[1].values()], float)
+    return {
+        "arm": name,
+        "kind": kind,
+        "seed": seed,
+        "size": defect.size,
+        "shift_m": compute_digest(defective_position - position),
+        "turn_rad": compute_digest(turn),
+        "parameters": compute_digest(parameters),
     }
-    return (
-        dict(zip(KEY, (name, kind, seed), strict=True)) | {"size": defect.size} | found
-    )
 
 
-def test_every_defect_does_what_it_did():
+def test_every_defect_has_its_recorded_effect():
     arms = {name: read_arm(ROBOTS / f"{name}.yaml") for name in ("fanuc", "iiwa14")}
     rows = [
-        (name, kind, seed)
+        make_row(name, kind, seed)
         for name, arm in arms.items()
         for kind in sorted(KINDS)
         for seed in (3, 4)
         if KINDS[kind].locations(arm)
     ]
-    table = pd.DataFrame([row_of(*row) for row in rows])
+    table = pd.DataFrame(rows)
     if os.environ.get("GOLDEN") == "write":
         table.to_csv(GOLDEN, index=False)
     pd.testing.assert_frame_equal(table, pd.read_csv(GOLDEN), rtol=1e-6, atol=1e-13)

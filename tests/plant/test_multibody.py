@@ -1,5 +1,5 @@
-"""The compiled arm and its equilibria against the analysis' own model, pinocchio,
-MuJoCo's inverse dynamics, closed forms."""
+"""The compiled arm and its equilibria, checked against the model of the analysis,
+pinocchio, MuJoCo's inverse dynamics and closed forms."""
 
 from itertools import cycle
 
@@ -27,11 +27,12 @@ from elastocal_proof.plant.multibody import (
     solve_equilibrium,
 )
 
-# One joint about y, its link forwards along x, and a measuring point at its end.
+# One joint about y, and a link along x with a measuring point at its end.
 LEVER = arm_of("Ry(q1) Tx(1.0) [A]", compliance_urad_per_Nm=[50.0])
 
 
-def everything(arm):
+def make_complete_structure(arm):
+    """A structure with every kind of elasticity and weight."""
     return Structure(
         base=(1e-8, 1e-8, 5e-9, 5e-8, 5e-8, 1e-8),
         flange=(1e-8, 2e-8, 1e-8, 2e-7, 1e-7, 3e-7),
@@ -48,107 +49,115 @@ def everything(arm):
     )
 
 
-@pytest.mark.parametrize("name_of_chain", sorted(OTHER_CHAINS))
-def test_chains_of_three_to_seven_joints_that_turn_backwards_are_read_and_bend_alike(
-    name_of_chain,
-):
-    """J C J^T w of each measuring point; both have compliances 1 to n."""
-    robot = robot_of(OTHER_CHAINS[name_of_chain])
-    arm = arm_of(OTHER_CHAINS[name_of_chain])
+@pytest.mark.parametrize("chain", sorted(OTHER_CHAINS))
+def test_arms_of_three_to_seven_joints_bend_like_the_model_of_the_analysis(chain):
+    """J C J^T w of each measuring point; both arms have compliances 1 to n, and joints
+    that turn backwards."""
+    robot = robot_of(OTHER_CHAINS[chain])
+    arm = arm_of(OTHER_CHAINS[chain])
     angles, wrench = angles_and_wrenches(arm, force=10.0)
-    machine, bent = at_rest(arm, angles, wrench)
-    _, position, rotation = forces_at(machine, angles)
-    seen = [
+    model, rest = at_rest(arm, angles, wrench)
+    _, position, rotation = forces_at(model, angles)
+    poses_and_jacobians = [
         compute_poses_and_jacobians(robot.chain, angles, point)
         for point in robot.chain.points
     ]
-    turn = robot.compliance * joint_torques(seen[-1][2], wrench)
-    for p, (place, facing, jacobian) in enumerate(seen):
-        np.testing.assert_allclose(position[:, p], place, atol=1e-12)
-        np.testing.assert_allclose(rotation[:, p], facing, atol=1e-12)
-        found = compute_pose_differences(
-            bent[2][:, p], bent[3][:, p], position[:, p], rotation[:, p]
+    turn = robot.compliance * joint_torques(poses_and_jacobians[-1][2], wrench)
+    for point, (expected_position, expected_rotation, jacobian) in enumerate(
+        poses_and_jacobians
+    ):
+        np.testing.assert_allclose(position[:, point], expected_position, atol=1e-12)
+        np.testing.assert_allclose(rotation[:, point], expected_rotation, atol=1e-12)
+        deflection = compute_pose_differences(
+            rest.position[:, point],
+            rest.rotation[:, point],
+            position[:, point],
+            rotation[:, point],
         )
         np.testing.assert_allclose(
-            found, np.einsum("sij,sj->si", jacobian, turn), atol=2e-8
+            deflection, np.einsum("sij,sj->si", jacobian, turn), atol=2e-8
         )
 
 
-def test_weight_turns_the_joints_as_pinocchio_says(arm):
-    places = [
-        (1, 300.0, (0.1, 0.0, 0.3)),
-        (2, 250.0, (0.4, 0.02, -0.04)),
-        (2, 90.0, (0.0, 0.1, 0.9)),
-        (3, 150.0, (0.3, 0, 0.1)),
-    ]
-    masses = tuple(LinkMass(*each) for each in places)
-    load = LinkMass(arm.joints, 120.0, (0.1, -0.05, 0.15))
-    gravity = (3.0, -2.0, -9.0)
-    angles, _ = angles_and_wrenches(arm)
-    found = forces_at(
-        build_model(arm, Structure(masses=masses, payload=load, gravity_m_s2=gravity)),
-        angles,
-    )[0]
+GRAVITY = (3.0, -2.0, -9.0)
+
+
+def build_pinocchio_model(arm, masses, payload):
+    """The same rigid arm with the same weights in pinocchio."""
     model = pin.Model()
     parent = 0
     for number, axis in enumerate(arm.axes):
-        place = pin.SE3(arm.links[number].rotation, arm.links[number].vector_m)
-        parent = model.addJoint(
-            parent, pin.JointModelRevoluteUnaligned(axis), place, f"q{number}"
-        )
-        stretch = arm.links[number + 1]
+        placement = pin.SE3(arm.links[number].rotation, arm.links[number].vector_m)
+        joint = pin.JointModelRevoluteUnaligned(axis)
+        parent = model.addJoint(parent, joint, placement, f"q{number}")
         weights = [
-            (m.mass_kg, np.array(m.centre_m)) for m in masses if m.link == number + 1
+            (mass.mass_kg, np.array(mass.centre_m))
+            for mass in masses
+            if mass.link == number + 1
         ]
         if number == arm.joints - 1:
-            weights.append(
-                (
-                    load.mass_kg,
-                    stretch.vector_m + stretch.rotation @ np.array(load.centre_m),
-                )
-            )
-        for kilograms, centre in weights:
-            model.appendBodyToJoint(
-                parent, pin.Inertia(kilograms, centre, np.eye(3)), pin.SE3.Identity()
-            )
-    model.gravity.linear = np.array(gravity)
+            link = arm.links[number + 1]
+            centre = link.vector_m + link.rotation @ np.array(payload.centre_m)
+            weights.append((payload.mass_kg, centre))
+        for mass_kg, centre in weights:
+            inertia = pin.Inertia(mass_kg, centre, np.eye(3))
+            model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
+    model.gravity.linear = np.array(GRAVITY)
+    return model
+
+
+def test_gravity_torques_agree_with_pinocchio(arm):
+    masses = (
+        LinkMass(1, 300.0, (0.1, 0.0, 0.3)),
+        LinkMass(2, 250.0, (0.4, 0.02, -0.04)),
+        LinkMass(2, 90.0, (0.0, 0.1, 0.9)),
+        LinkMass(3, 150.0, (0.3, 0, 0.1)),
+    )
+    payload = LinkMass(arm.joints, 120.0, (0.1, -0.05, 0.15))
+    structure = Structure(masses=masses, payload=payload, gravity_m_s2=GRAVITY)
+    angles, _ = angles_and_wrenches(arm)
+    torques = forces_at(build_model(arm, structure), angles)[0]
+    model = build_pinocchio_model(arm, masses, payload)
     data = model.createData()
-    wanted = -np.array(
+    expected = -np.array(
         [pin.computeGeneralizedGravity(model, data, row) for row in angles]
     )
-    np.testing.assert_allclose(found, wanted, atol=1e-9 * np.abs(wanted).max())
+    tolerance = 1e-9 * np.abs(expected).max()
+    np.testing.assert_allclose(torques, expected, atol=tolerance)
 
 
-def test_an_arm_with_everything_is_in_equilibrium_by_mujocos_inverse_dynamics(arm):
-    """Each spring pulls back by what it has yielded over its compliance."""
+def test_a_complete_arm_is_in_equilibrium_by_mujocos_inverse_dynamics(arm):
+    """Each spring pulls back by its deflection divided by its compliance."""
     angles, wrench = angles_and_wrenches(arm)
-    machine, rest = at_rest(arm, angles, wrench, structure=everything(arm))
-    model, data = machine.model, mujoco.MjData(machine.model)
-    compliance = machine.compliance.copy()
-    compliance[machine.gear] = arm.compliance
-    # What is commanded stays where it is, and so does what no law lets yield.
-    free = np.flatnonzero(compliance > 0)
-    flange = machine.sites[-1]
-    for row, push in zip(rest[0][:20], wrench[:20], strict=True):
+    model, rest = at_rest(arm, angles, wrench, structure=make_complete_structure(arm))
+    mujoco_model = model.model
+    data = mujoco.MjData(mujoco_model)
+    compliance = model.compliance.copy()
+    compliance[model.gear] = arm.compliance
+    # Drives, and coordinates that no law moves, do not yield.
+    elastic = np.flatnonzero(compliance > 0)
+    flange = model.sites[-1]
+    for row, push in zip(rest.coordinates[:20], wrench[:20], strict=True):
         data.qpos[:] = row
         data.qvel[:] = 0.0
         data.qacc[:] = 0.0
-        mujoco.mj_inverse(model, data)
-        force = np.zeros(model.nv)
+        mujoco.mj_inverse(mujoco_model, data)
+        force = np.zeros(mujoco_model.nv)
         mujoco.mj_applyFT(
-            model,
+            mujoco_model,
             data,
             push[:3],
             push[3:],
             data.site_xpos[flange],
-            model.site_bodyid[flange],
+            mujoco_model.site_bodyid[flange],
             force,
         )
-        left = (data.qfrc_inverse - force)[free] + row[free] / compliance[free]
-        assert np.abs(left).max() < 1e-9 * np.abs(force).max()
+        spring_force = row[elastic] / compliance[elastic]
+        imbalance = (data.qfrc_inverse - force)[elastic] + spring_force
+        assert np.abs(imbalance).max() < 1e-9 * np.abs(force).max()
 
 
-def test_an_arm_that_finds_no_rest_is_an_error():
+def test_an_iteration_that_does_not_settle_is_an_error():
     signs = cycle([0.01, -0.01])
     problem = EquilibriumProblem(
         drive=np.zeros((1, 1)),
@@ -162,13 +171,15 @@ def test_an_arm_that_finds_no_rest_is_an_error():
         solve_equilibrium(build_model(LEVER, Structure()), problem)
 
 
-def test_a_point_inside_a_link_of_wrong_length_keeps_its_place_and_none_may_be_inside_an_elastic_one():
+def test_geometry_errors_of_a_link_move_no_point_inside_it():
     arm = arm_of("Rz(q1) Tx(0.4) [inner] Tx(0.6) Ry(q2) Tx(0.5) [B]")
-    machine = build_model(
-        arm, Structure(geometry_errors={1: ((0.0, 0.02, 0.0), (0.0, 0.0, 0.1))})
-    )
-    np.testing.assert_allclose(
-        forces_at(machine, np.zeros((1, 2)))[1][0, 0], [0.4, 0.0, 0.0], atol=1e-14
-    )
+    errors = {1: ((0.0, 0.02, 0.0), (0.0, 0.0, 0.1))}
+    model = build_model(arm, Structure(geometry_errors=errors))
+    position = forces_at(model, np.zeros((1, 2)))[1]
+    np.testing.assert_allclose(position[0, 0], [0.4, 0.0, 0.0], atol=1e-14)
+
+
+def test_an_elastic_link_with_a_point_inside_it_is_refused():
+    arm = arm_of("Rz(q1) Tx(0.4) [inner] Tx(0.6) Ry(q2) Tx(0.5) [B]")
     with pytest.raises(InputError, match="inner"):
         build_model(arm, Structure(tubes={1: TaperedTube(1e6, 1e6)}))

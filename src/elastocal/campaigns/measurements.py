@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 from elastocal.campaigns.tables import HEADER_WITHOUT_ROWS, Cells, read_text_table
 from elastocal.counting import format_count
 from elastocal.errors import InputError, suggest_names
-from elastocal.io.atomic_writes import atomic_write
+from elastocal.io.atomic_writes import write_atomically
 from elastocal.io.storage import Column
 from elastocal.io.texts import describe_file_kind
 from elastocal.mechanics.components import WRENCH, WRENCH_NAMES
@@ -49,54 +49,38 @@ LARGEST_ROTATION_RAD = 3.0 * np.pi
 def describe_columns(joints: int) -> dict[str, Column]:
     """Return every column that a file of measurements may have, by its name."""
     numbers = range(1, joints + 1)
-
-    def integer(name: str, meaning: str) -> Column:
-        return Column(name, "int32", "", meaning)
-
-    def number(name: str, unit: str, meaning: str) -> Column:
-        return Column(name, "float64", unit, meaning)
-
+    session = "sessions have each their own tracker frame; 0 throughout where absent"
+    repeat = "number of the fresh approach to this pose and load"
+    u95 = "expanded uncertainty of this position: 95 % of one coordinate"
+    angle = "angle of joint {} as the controller reports it"
+    approach = "sense of approach of joint {}: -1, 0, +1"
     columns = [
-        integer(
-            "session",
-            "sessions have each their own tracker frame; 0 throughout where absent",
-        ),
-        integer("pose", "number of the pose in its session"),
-        integer("load", "number of the load, 0 where unloaded"),
-        integer("repeat", "number of the fresh approach to this pose and load"),
-        Column("target", "string", "", "name of the target that was read"),
-        *(
-            number(
-                f"q{joint}",
-                "rad",
-                f"angle of joint {joint} as the controller reports it",
-            )
-            for joint in numbers
-        ),
-        *(
-            number(name, unit, f"external {meaning}, at the last measuring point")
-            for name, unit, meaning in WRENCH
-        ),
-        *(number(axis, "m", f"measured position along {axis}") for axis in "xyz"),
-        *(
-            number(f"r{axis}", "rad", f"measured rotation vector about {axis}")
-            for axis in "xyz"
-        ),
-        *(
-            number(
-                f"approach{joint}", "", f"sense of approach of joint {joint}: -1, 0, +1"
-            )
-            for joint in numbers
-        ),
-        number("time_s", "s", "time since any instant"),
-        number("temperature_c", "°C", "temperature"),
-        number(
-            "u95_m",
-            "m",
-            "expanded uncertainty of this position: 95 % of one coordinate",
-        ),
+        ("session", "int32", "", session),
+        ("pose", "int32", "", "number of the pose in its session"),
+        ("load", "int32", "", "number of the load, 0 where unloaded"),
+        ("repeat", "int32", "", repeat),
+        ("target", "string", "", "name of the target that was read"),
     ]
-    return {column.name: column for column in columns}
+    columns += [
+        (f"q{joint}", "float64", "rad", angle.format(joint)) for joint in numbers
+    ]
+    for name, unit, component in WRENCH:
+        meaning = f"external {component}, at the last measuring point"
+        columns.append((name, "float64", unit, meaning))
+    for axis in "xyz":
+        columns.append((axis, "float64", "m", f"measured position along {axis}"))
+    for axis in "xyz":
+        meaning = f"measured rotation vector about {axis}"
+        columns.append((f"r{axis}", "float64", "rad", meaning))
+    columns += [
+        (f"approach{joint}", "float64", "", approach.format(joint)) for joint in numbers
+    ]
+    columns += [
+        ("time_s", "float64", "s", "time since any instant"),
+        ("temperature_c", "float64", "°C", "temperature"),
+        ("u95_m", "float64", "m", u95),
+    ]
+    return {column[0]: Column(*column) for column in columns}
 
 
 def is_file(path: str | Path) -> bool:
@@ -281,7 +265,7 @@ def write_measurements(
         column for name, column in describe_columns(joints).items() if name in table
     ]
     cells = [np.asarray(table[column.name]).tolist() for column in columns]
-    with atomic_write(path) as partial:
+    with write_atomically(path) as partial:
         if Path(path).name == CSV:
             _write_csv(partial, columns, cells)
         else:

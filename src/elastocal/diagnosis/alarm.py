@@ -15,7 +15,6 @@ If nothing is missing, a Bayes factor exceeds b with a probability of at most 1/
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -129,11 +128,6 @@ class _AverageBayesFactor:
             blocks,
         )
 
-    @cached_property
-    def _variances(self) -> np.ndarray:
-        """Prior variances (S,) of a coefficient at the scales of the grid."""
-        return self.problem.grid.scales**2
-
     def log_values(self, score: np.ndarray, residual_squares: np.ndarray) -> np.ndarray:
         """Log of the average Bayes factor of N data sets, (N,).
 
@@ -147,7 +141,9 @@ class _AverageBayesFactor:
         )
         nothing = log_sum_exp(self.base[:, None] + likelihood, axis=0)
         total = np.full(len(nothing), -np.inf)
-        step = max(_AT_ONCE // (residual_squares.size * len(self._variances)), 1)
+        step = max(
+            _AT_ONCE // (residual_squares.size * len(self.problem.grid.scales)), 1
+        )
         for block in self.blocks:
             for start in range(0, len(block.numbers), step):
                 chosen = slice(start, start + step)
@@ -172,7 +168,7 @@ class _AverageBayesFactor:
             self.problem.grid.log_weights_by_range[first, term.largest][scales]
             for first, term in zip(smallest, alternatives, strict=True)
         ]
-        variances = self._variances[scales, None]
+        variances = self.problem.grid.scales[scales, None] ** 2
         widened = 1.0 + variances * block.eigenvalues[:, chosen, None]
         eigenvectors = block.eigenvectors[:, chosen].swapaxes(-1, -2)
         by_axis = (eigenvectors @ score[:, block.columns[chosen]]) ** 2

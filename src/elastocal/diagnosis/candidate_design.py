@@ -99,20 +99,16 @@ class WhitenedFit:
 
     @property
     def rows(self) -> WhitenedRows:
-        """Whitened rows whose candidates hold only the Jacobian of the coordinates.
+        """Whitened rows whose candidates hold only the Jacobian of the coordinates."""
+        return self.rows_and_conditions[0]
+
+    @cached_property
+    def rows_and_conditions(self) -> tuple[WhitenedRows, Conditions]:
+        """The rows, and the conditions at the deflected robot.
 
         A candidate displaces the coordinates of a state, and correlated errors are of
         one state. So it is the Jacobian that is whitened, not every column.
         """
-        return self._rows_and_conditions[0]
-
-    @property
-    def deflected_conditions(self) -> Conditions:
-        """Conditions at the deflected robot."""
-        return self._rows_and_conditions[1]
-
-    @cached_property
-    def _rows_and_conditions(self) -> tuple[WhitenedRows, Conditions]:
         fitted = self.fitted
         observations = self.observations
         linearization = linearize(
@@ -224,7 +220,7 @@ class CandidateDesign:
     @property
     def rows(self) -> WhitenedRows:
         """Whitened rows with the candidate columns in the order of the terms."""
-        conditions = self.whitened.deflected_conditions
+        rows, conditions = self.whitened.rows_and_conditions
         displacements = [
             column
             for candidate, shape_values in self.tried.values()
@@ -233,7 +229,6 @@ class CandidateDesign:
         ]
         for discrepancy in self.discrepancies:
             displacements += discrepancy.displacement(conditions)
-        rows = self.whitened.rows
         candidates = FactoredSensitivities.of(
             displacements,
             rows.candidates.jacobian,
@@ -260,9 +255,12 @@ class CandidateDesign:
         by_observation = (rows.jacobian**2).sum(axis=(1, 2)) / rows.jacobian.shape[-1]
         information = float(np.median(np.bincount(rows.pose, by_observation)))
         if information < _LEAST_INFORMATION:
-            found = "measurements that no joint moves"
-            allowed = "targets on what moves, off a lone axis"
-            raise InputError("campaign", "targets", found, allowed)
+            raise InputError(
+                "campaign",
+                "targets",
+                "measurements that no joint moves",
+                "targets on what moves, off a lone axis",
+            )
         return 1.0 / np.sqrt(information)
 
     @property

@@ -636,7 +636,8 @@ def _contradict(
 def _describe_losses(
     frames: Fit, models: Sequence[Fit], observations: Observations, settings: Settings
 ) -> list[str]:
-    """Describe how models predict left-out training poses worse than frames alone.
+    """Describe how models with few measurements for their parameters predict left-out
+    training poses worse than frames alone, by more than a standard error.
 
     Parameters
     ----------
@@ -656,33 +657,25 @@ def _describe_losses(
         sentences at all if the last model does not.
     """
     names = ("declared model", "model with the effects found")
-    sentences = [
-        _describe_loss(frames, fitted, name, observations, settings)
-        for fitted, name in zip(models, names, strict=False)
-    ]
+    sentences = []
+    for fitted, name in zip(models, names, strict=False):
+        sentences.append("")
+        effective = count_effective_parameters(fitted)
+        if fitted.residual.size >= settings.numbers_a_parameter * effective:
+            continue
+        squares = predict_left_out_squares(fitted, observations)
+        frames_squares = predict_left_out_squares(frames, observations)
+        loss = squares - frames_squares
+        if loss.mean() > loss.std(ddof=1) / np.sqrt(len(loss)):
+            rms_mm = 1e3 * np.sqrt(squares.mean())
+            frames_rms_mm = 1e3 * np.sqrt(frames_squares.mean())
+            sentences[-1] = (
+                f"training poses left out in turn are off by {rms_mm:.2f} mm RMS by the"
+                f" {name}, by {frames_rms_mm:.2f} mm with frames and targets alone:"
+                f" {len(loss)} poses are too few for {effective:.0f} parameters, and"
+                f" the {name} is not kept"
+            )
     return sentences if sentences[-1] else []
-
-
-def _describe_loss(
-    frames: Fit, fitted: Fit, name: str, observations: Observations, settings: Settings
-) -> str:
-    """A sentence if one model with few measurements for its parameters predicts
-    left-out training poses worse than frames alone by more than a standard error."""
-    effective = count_effective_parameters(fitted)
-    if fitted.residual.size >= settings.numbers_a_parameter * effective:
-        return ""
-    squares = predict_left_out_squares(fitted, observations)
-    frames_squares = predict_left_out_squares(frames, observations)
-    loss = squares - frames_squares
-    if not loss.mean() > loss.std(ddof=1) / np.sqrt(len(loss)):
-        return ""
-    rms_mm = 1e3 * np.sqrt(squares.mean())
-    frames_rms_mm = 1e3 * np.sqrt(frames_squares.mean())
-    return (
-        f"training poses left out in turn are off by {rms_mm:.2f} mm RMS by the {name},"
-        f" by {frames_rms_mm:.2f} mm with frames and targets alone: {len(loss)} poses"
-        f" are too few for {effective:.0f} parameters, and the {name} is not kept"
-    )
 
 
 def _effect_steps(subset: FittedSubset, final: Fit, evidence: Evidence) -> list[Step]:

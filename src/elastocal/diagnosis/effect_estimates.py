@@ -140,49 +140,33 @@ def state_parameters(
     """
     effect = next(effect for effect in fitted.model.effects if effect.key == member.key)
     unknowns: list[Parameter | Shape] = [*effect.parameters, *effect.shapes]
-    stated = [
-        _state_parameter(member.key, unknown, float(value), index, fitted, average)
-        for unknown, value, index in zip(
-            unknowns,
-            np.concatenate(fitted.effect_values(member.key)),
-            fitted.parameter_indices(member.key),
-            strict=True,
+    values = np.concatenate(fitted.effect_values(member.key))
+    keeps_masses = fitted.model.identifies_compliance or member.family != "gravity"
+    stated = []
+    for unknown, value, index in zip(
+        unknowns, values, fitted.parameter_indices(member.key), strict=True
+    ):
+        key = (member.key, unknown.name)
+        is_held = bool(fitted.unidentifiable[index])
+        is_shape = isinstance(unknown, Shape)
+        std_error = float(np.sqrt(fitted.covariance[index, index]))
+        parameter = EffectParameter(
+            name=f"{member.key} {unknown.name}",
+            value=float(value) + average.shift.get(key, 0.0),
+            std_error=average.std_error.get(key, std_error),
+            unit=unknown.unit,
+            prior_std=getattr(unknown, "prior_std", None),
+            held=is_held,
+            # A shape without a slope, such as the row of a step, was chosen by a
+            # search.
+            identifiable=is_shape
+            or (not is_held and key not in average.prior_dominated),
+            shape=is_shape,
         )
-    ]
-    if fitted.model.identifies_compliance or member.family != "gravity":
-        return stated
-    return [
-        _multiply_by_compliance(parameter, fitted)
-        if parameter.unit in _PRODUCT_UNITS
-        else parameter
-        for parameter in stated
-    ]
-
-
-def _state_parameter(
-    owner: str,
-    unknown: Parameter | Shape,
-    value: float,
-    index: int,
-    fitted: Fit,
-    average: ModelAverage,
-) -> EffectParameter:
-    """State the unknown at an index of a fit."""
-    key = (owner, unknown.name)
-    is_held = bool(fitted.unidentifiable[index])
-    is_shape = isinstance(unknown, Shape)
-    std_error = float(np.sqrt(fitted.covariance[index, index]))
-    return EffectParameter(
-        name=f"{owner} {unknown.name}",
-        value=value + average.shift.get(key, 0.0),
-        std_error=average.std_error.get(key, std_error),
-        unit=unknown.unit,
-        prior_std=getattr(unknown, "prior_std", None),
-        held=is_held,
-        # A shape without a slope, such as the row of a step, was chosen by a search.
-        identifiable=is_shape or (not is_held and key not in average.prior_dominated),
-        shape=is_shape,
-    )
+        if not keeps_masses and parameter.unit in _PRODUCT_UNITS:
+            parameter = _multiply_by_compliance(parameter, fitted)
+        stated.append(parameter)
+    return stated
 
 
 def _multiply_by_compliance(parameter: EffectParameter, fitted: Fit) -> EffectParameter:
@@ -300,14 +284,13 @@ def find_oversized_effects(fitted: Fit, names: Collection[str]) -> set[str]:
     names : collection of str
         Effects to look at.
     """
-    oversized = set()
-    for effect in fitted.model.effects:
-        if effect.effect not in names:
-            continue
-        for value, std_error, parameter in _generate_estimates(fitted, effect):
-            if _is_oversized(value, std_error, parameter):
-                oversized.add(effect.effect)
-    return oversized
+    return {
+        effect.effect
+        for effect in fitted.model.effects
+        if effect.effect in names
+        for estimate in _generate_estimates(fitted, effect)
+        if _is_oversized(*estimate)
+    }
 
 
 def _generate_estimates(

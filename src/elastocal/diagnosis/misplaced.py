@@ -63,7 +63,7 @@ class _FreeParameters:
     axes : for shifts "x", "y" or "z"; meaningless for the others
     is_geometry : (N,) bool, placements of the base, links and joint offsets
     is_turn : (N,) bool, turns among these
-    places : by index of a shift of the base or of a link, the frame that it moves
+    frames : by index of a shift of the base or of a link, the frame that it moves
     """
 
     values: np.ndarray
@@ -71,7 +71,7 @@ class _FreeParameters:
     axes: list[str]
     is_geometry: np.ndarray
     is_turn: np.ndarray
-    places: dict[int, str]
+    frames: dict[int, str]
 
     @classmethod
     def of_fit(cls, fitted: Fit, campaign: Campaign) -> _FreeParameters:
@@ -80,43 +80,34 @@ class _FreeParameters:
         owners = [fitted.parameters[index][0] for index in free]
         parameters = [fitted.parameters[index][1] for index in free]
         effects = {effect.key: effect.effect for effect in fitted.model.effects}
-        kinds = [effects.get(owner) for owner in owners]
-        is_geometry = np.array(
-            [kind in (_BASE, _LINK, _OFFSET) for kind in kinds], bool
+        is_geometry = np.isin(
+            [effects.get(owner, "") for owner in owners], (_BASE, _LINK, _OFFSET)
         )
         is_angle = np.array([p.unit == "rad" for p in parameters], bool)
-        tool = _find_tool(campaign)
-        places = {}
-        for index, (owner, kind) in enumerate(zip(owners, kinds, strict=True)):
-            if kind in (_BASE, _LINK) and parameters[index].unit == "m":
-                places[index] = f"link {owner.partition('@')[2]}"
-                if owner == tool:
-                    places[index] = TOOL
-                elif kind == _BASE:
-                    places[index] = BASE
+        frames = {}
+        for index, owner in enumerate(owners):
+            effect = effects.get(owner)
+            if effect in (_BASE, _LINK) and parameters[index].unit == "m":
+                frames[index] = _name_frame(owner, effect, campaign)
         return cls(
             get_parameter_values(fitted.model, fitted.estimate)[free],
             np.array([parameter.plausible for parameter in parameters]),
             [parameter.name[-1] for parameter in parameters],
             is_geometry,
             is_geometry & is_angle,
-            places,
+            frames,
         )
 
-    @property
-    def shifts(self) -> list[int]:
-        """Indices of the shifts of the base and of links."""
-        return list(self.places)
 
-    @property
-    def is_plausible(self) -> bool:
-        """Whether no shift exceeds its usual size, so that nothing can be misplaced."""
-        return bool((np.abs(self.values) < self.usual_sizes)[self.shifts].all())
-
-    @property
-    def is_linear(self) -> bool:
-        """Whether all turns are so small that the geometry is linear."""
-        return not (np.abs(self.values[self.is_turn]) > _LARGEST_TURN).any()
+def _name_frame(owner: str, effect: str, campaign: Campaign) -> str:
+    """Name of the frame that the geometry of some owner moves. The last link's end is
+    the tool if a target with a declared offset is on it."""
+    has_tool = any(target.offset_m is not None for target in _end_targets(campaign))
+    if has_tool and owner == f"{_LINK}@{campaign.robot.joints}":
+        return TOOL
+    if effect == _BASE:
+        return BASE
+    return f"link {owner.partition('@')[2]}"
 
 
 @dataclass(frozen=True)
@@ -163,7 +154,7 @@ class _NormalEquations:
         precision[np.diag_indices(len(free))] -= np.where(
             parameters.is_geometry, fitted.prior_std[free] ** -2.0, 0.0
         )
-        largest_m = float(np.abs(parameters.values[parameters.shifts]).max())
+        largest_m = float(np.abs(parameters.values[list(parameters.frames)]).max())
         return cls(
             parameters, precision / misfit, score / misfit, max(_WRONG_M, largest_m)
         )
@@ -201,25 +192,27 @@ def find_misplaced_frames(fitted: Fit, campaign: Campaign) -> list[MisplacedFram
     Frames; a shift is in the axes of the base, or of the far end of the link
     """
     parameters = _FreeParameters.of_fit(fitted, campaign)
-    if not parameters.shifts or parameters.is_plausible or not parameters.is_linear:
+    is_usual = np.abs(parameters.values) < parameters.usual_sizes
+    largest_turn = np.abs(parameters.values[parameters.is_turn]).max(initial=0.0)
+    if is_usual[list(parameters.frames)].all() or largest_turn > _LARGEST_TURN:
         return []
     wrong = _find_wrong_shifts(_NormalEquations.of_fit(fitted, parameters))
-    frames = []
-    for place, alternatives in wrong.alternatives.items():
-        indices = [n for n in wrong.indices if parameters.places[n] == place]
+    misplaced = []
+    for frame, alternatives in wrong.alternatives.items():
+        indices = [n for n in wrong.indices if parameters.frames[n] == frame]
         shift_m = np.zeros(3)
         axes = ["xyz".index(parameters.axes[n]) for n in indices]
         shift_m[axes] = wrong.values[indices]
         usual_m = parameters.usual_sizes[indices].max()
         sizes = float(np.linalg.norm(shift_m) / usual_m)
         if sizes > _MOST_SIZES:
-            sentence = _describe_frame(place, alternatives, shift_m, sizes, campaign)
-            frames.append(
+            sentence = _describe_frame(frame, alternatives, shift_m, sizes, campaign)
+            misplaced.append(
                 MisplacedFrame(
-                    place, alternatives, tuple(shift_m.tolist()), sizes, sentence
+                    frame, alternatives, tuple(shift_m.tolist()), sizes, sentence
                 )
             )
-    return frames
+    return misplaced
 
 
 @dataclass(frozen=True)
@@ -230,7 +223,7 @@ class _WrongShifts:
     ----------
     indices : of their parameters
     values : (N,), most probable parameters with these shifts
-    alternatives : by place, the other places whose shift explains the measurements as
+    alternatives : by frame, the other frames whose shift explains the measurements as
         well
     """
 
@@ -242,14 +235,14 @@ class _WrongShifts:
 def _find_wrong_shifts(equations: _NormalEquations) -> _WrongShifts:
     """Declare shifts as wrong, one after the other, as long as each makes the
     measurements more probable."""
-    places = equations.parameters.places
+    frames = equations.parameters.frames
     wrong: list[int] = []
-    equivalent_places: dict[str, set[str]] = {}
+    equivalent_frames: dict[str, set[str]] = {}
     explanation = equations.explain(wrong)
     while len(wrong) < _MOST_AXES:
         tried = {
             shift: equations.explain([*wrong, *shift])
-            for shift in _list_shifts(places)
+            for shift in _list_shifts(frames)
             if not set(shift) & set(wrong)
         }
         most = max((e.log_evidence for e in tried.values()), default=-np.inf)
@@ -260,30 +253,30 @@ def _find_wrong_shifts(equations: _NormalEquations) -> _WrongShifts:
             for shift, explained in tried.items()
             if explained.log_evidence > most - _AS_WELL
         }
-        shift = _choose_shift(equivalent, places)
+        shift = _choose_shift(equivalent, frames)
         explanation = tried[shift]
         wrong += shift
-        equivalent_places.setdefault(places[shift[0]], set()).update(
-            places[indices[0]] for indices in equivalent
+        equivalent_frames.setdefault(frames[shift[0]], set()).update(
+            frames[indices[0]] for indices in equivalent
         )
     alternatives = {
-        place: tuple(sorted(equivalent - {place}))
-        for place, equivalent in equivalent_places.items()
+        frame: tuple(sorted(equivalent - {frame}))
+        for frame, equivalent in equivalent_frames.items()
     }
     return _WrongShifts(wrong, explanation.values, alternatives)
 
 
-def _list_shifts(places: dict[int, str]) -> list[tuple[int, ...]]:
+def _list_shifts(frames: dict[int, str]) -> list[tuple[int, ...]]:
     """Ways to shift a frame, as indices of parameters: along one axis, or along all."""
-    single = [(index,) for index in places]
+    single = [(index,) for index in frames]
     whole: dict[str, tuple[int, ...]] = {}
-    for index, place in places.items():
-        whole[place] = (*whole.get(place, ()), index)
+    for index, frame in frames.items():
+        whole[frame] = (*whole.get(frame, ()), index)
     return list(dict.fromkeys([*single, *whole.values()]))
 
 
 def _choose_shift(
-    equivalent: dict[tuple[int, ...], _Explanation], places: dict[int, str]
+    equivalent: dict[tuple[int, ...], _Explanation], frames: dict[int, str]
 ) -> tuple[int, ...]:
     """Choose among shifts that explain the measurements as well as each other.
 
@@ -294,7 +287,7 @@ def _choose_shift(
     return min(
         equivalent,
         key=lambda shift: (
-            order.get(places[shift[0]], 2),
+            order.get(frames[shift[0]], 2),
             len(shift),
             -equivalent[shift].log_evidence,
         ),
@@ -325,14 +318,6 @@ def describe_reference_point(campaign: Campaign) -> str:
     return f"All errors are those of {end}, measured by the target {'; '.join(descriptions)}."
 
 
-def _find_tool(campaign: Campaign) -> str:
-    """Key of the last link, whose end is the tool if a target with a declared offset is
-    on it; empty otherwise."""
-    if any(target.offset_m is not None for target in _end_targets(campaign)):
-        return f"{_LINK}@{campaign.robot.joints}"
-    return ""
-
-
 def _end_targets(campaign: Campaign) -> list[Target]:
     """Targets on the measuring point of the end effector."""
     end = campaign.robot.chain.end_effector.name
@@ -344,7 +329,7 @@ def _format_millimetres(vector_m: Sequence[float] | np.ndarray) -> str:
 
 
 def _describe_frame(
-    place: str,
+    frame: str,
     alternatives: tuple[str, ...],
     shift_m: np.ndarray,
     sizes: float,
@@ -357,20 +342,20 @@ def _describe_frame(
     axis = np.argmax(np.abs(shift_m))
     if np.abs(shift_m[axis]) > _ALONG * length_m:
         direction = f"along {'xyz'[axis]}"
-    if place == TOOL:
+    if frame == TOOL:
         end = campaign.robot.chain.end_effector.name
         text = (
             f"reflector or tool sits {length} from where it is declared, {direction} of {end}: "
             "the flange is not certified, the reflector is"
         )
-    elif place == BASE:
+    elif frame == BASE:
         text = f"the base stands {length} from where it is declared, {direction} of the base"
     else:
         text = (
-            f"{place} ends {length} from where the robot file has it, {direction} of its far end: "
+            f"{frame} ends {length} from where the robot file has it, {direction} of its far end: "
             "a wrong length, or another variant of the robot"
         )
-        if place == "link 1":
+        if frame == "link 1":
             text += ", or a wrong height of base or pedestal"
     if alternatives:
         names = " or ".join(alternatives)

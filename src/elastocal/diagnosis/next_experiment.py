@@ -394,16 +394,22 @@ class _Plan:
 
     Attributes
     ----------
-    hypotheses : the best one and its alternatives
     chosen : indices of the experiments
-    separations : (experiments, alternatives), after each experiment
-    within_reach : (alternatives,) bool, alternatives that some experiment can resolve
+    least_separations : (experiments,), smallest separation of the alternatives that
+        some experiment within reach can resolve
+    nearest : mechanisms of the alternative within reach that is separated least
+    unreachable : mechanisms of the alternatives that no experiment within reach
+        resolves
+    certainty : probability of the best hypothesis against the alternatives within
+        reach. If it is as large as an unambiguous diagnosis asks for, nothing that can
+        be resolved is ambiguous.
     """
 
-    hypotheses: list[Hypothesis]
     chosen: list[int]
-    separations: np.ndarray
-    within_reach: np.ndarray
+    least_separations: np.ndarray
+    nearest: tuple[str, ...]
+    unreachable: tuple[tuple[str, ...], ...]
+    certainty: float
 
     @classmethod
     def choose(
@@ -413,39 +419,28 @@ class _Plan:
         rows: np.ndarray,
         poses: int,
     ) -> _Plan:
-        """Choose experiments from some rows (E, R, U)."""
+        """Choose experiments from some rows (E, R, U) that separate the first
+        hypothesis from the others."""
         probabilities = np.array([h.probability for h in hypotheses])
         weights = np.sqrt(probabilities[0] * probabilities[1:])
         chosen, separations = select_experiments(pairs, weights, rows, poses)
-        within_reach = _find_resolvable(pairs, rows[chosen])
-        return cls(hypotheses, chosen, separations, within_reach)
-
-    @property
-    def unreachable(self) -> tuple[tuple[str, ...], ...]:
-        """Mechanisms of the alternatives that no experiment within reach resolves."""
-        pairs = zip(self.hypotheses[1:], self.within_reach, strict=True)
-        return tuple(h.mechanisms for h, is_within in pairs if not is_within)
-
-    @property
-    def certainty(self) -> float:
-        """Probability of the best hypothesis against the alternatives within reach.
-
-        If it is as large as an unambiguous diagnosis asks for, nothing that can be
-        resolved is ambiguous.
-        """
-        leading, *others = (h.probability for h in self.hypotheses)
-        return leading / (leading + np.array(others)[self.within_reach].sum())
-
-    @property
-    def nearest(self) -> tuple[str, ...]:
-        """Mechanisms of the alternative within reach that is separated least."""
-        separations = np.where(self.within_reach, self.separations[-1], np.inf)
-        return self.hypotheses[1 + int(np.argmin(separations))].mechanisms
-
-    @property
-    def least_separations(self) -> np.ndarray:
-        """Separation (experiments,) of the alternatives within reach."""
-        return self.separations[:, self.within_reach].min(axis=1)
+        # Repeat the experiments up to the largest number of poses. A pair is within
+        # reach if they then resolve it more likely than not.
+        repeated = np.sqrt(_MOST_POSES / poses) * rows[chosen].reshape(
+            1, -1, rows.shape[-1]
+        )
+        gains = np.array([pair.separation_gains(repeated)[0] for pair in pairs])
+        within_reach = compute_resolution_probability(gains) >= 0.5
+        separations = np.where(within_reach, separations, np.inf)
+        alternatives = [h.mechanisms for h in hypotheses[1:]]
+        rivals = probabilities[1:][within_reach].sum()
+        return cls(
+            chosen,
+            separations.min(axis=1),
+            alternatives[int(np.argmin(separations[-1]))],
+            tuple(alternatives[n] for n in np.flatnonzero(~within_reach)),
+            float(probabilities[0] / (probabilities[0] + rivals)),
+        )
 
 
 def _predict_experiments(
@@ -468,14 +463,6 @@ def _predict_experiments(
     )
     pairs = [HypothesisPair.of(leading, posterior) for posterior in following]
     return pairs, rows / noise_factor
-
-
-def _find_resolvable(pairs: Sequence[HypothesisPair], rows: np.ndarray) -> np.ndarray:
-    """Which pairs (pairs,) bool some experiments (E, R, U) would more likely than not
-    resolve if they were repeated up to the largest number of poses."""
-    repeated = np.sqrt(_MOST_POSES / len(rows)) * rows.reshape(1, -1, rows.shape[-1])
-    gains = np.array([pair.separation_gains(repeated)[0] for pair in pairs])
-    return compute_resolution_probability(gains) >= 0.5
 
 
 def _build_table(

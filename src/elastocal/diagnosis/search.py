@@ -203,12 +203,12 @@ def search_models(
         start = search.choose_best_variants(numbers)
         if 1 < len(start) <= problem.settings.largest_model:
             starts.append(start)
-    known = (
+    numbers = (
         n
         for n, term in enumerate(terms)
         if term.candidate and term.candidate.key in known_keys
     )
-    starts.append(search.choose_best_variants(known))
+    starts.append(search.choose_best_variants(numbers))
     for start in starts:
         if start:
             search.evaluate(start)
@@ -290,13 +290,22 @@ class BeamSearch:
         if len(model) >= self.problem.settings.largest_model:
             return
         self.extended.add(model)
-        open_terms = self._find_open_terms(model)
+        # Terms of a slot exclude each other.
+        open_terms = np.flatnonzero(~np.isin(self._slots, self._slots[list(model)]))
         if not len(open_terms):
             return
-        log_evidence, by_pose_error = self._evaluate_extensions(model)
+        before, by_pose_error = evaluate_extensions(
+            self.statistics,
+            self.statistics.log_likelihood + self._log_pose,
+            self.problem.scaled_columns(model, self.scales[model]),
+            self._blocks,
+            self.problem.grid,
+        )
+        by_pose_error += self._log_weights
         by_scale = log_sum_exp(by_pose_error, axis=0)
         if not model:
             self._drop_unlikely_pose_errors(by_pose_error, by_scale)
+        log_evidence = float(log_sum_exp(before))
         self._meet_extensions(model, open_terms, log_evidence, by_scale)
 
     def _drop_unlikely_pose_errors(
@@ -320,23 +329,6 @@ class BeamSearch:
         )
         self._keep_pose_errors((weights > NEGLIGIBLE_LOG_WEIGHT).any(axis=1))
         self.empty_evidence = self._evaluate_in_full((), ())
-
-    def _find_open_terms(self, model: TermSet) -> np.ndarray:
-        """Indices of the terms that may join a model: none of their slot is in it."""
-        return np.flatnonzero(~np.isin(self._slots, self._slots[list(model)]))
-
-    def _evaluate_extensions(self, model: TermSet) -> tuple[float, np.ndarray]:
-        """Log evidence of a model at the scales at which it was met, and that of the
-        model with each term added (T, number of terms, S), weighted by scale."""
-        before, by_pose_error = evaluate_extensions(
-            self.statistics,
-            self.statistics.log_likelihood + self._log_pose,
-            self.problem.scaled_columns(model, self.scales[model]),
-            self._blocks,
-            self.problem.grid,
-        )
-        by_pose_error += self._log_weights
-        return float(log_sum_exp(before)), by_pose_error
 
     def _meet_extensions(
         self,

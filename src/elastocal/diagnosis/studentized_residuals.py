@@ -308,20 +308,20 @@ def examine_residuals(
     if spread.all():
         shared = evaluate_conditions(model, estimate, observations.states)
     residual = np.empty((len(observations), model.rows))
-    for states, rows, part in split_into_blocks(observations, 0):
-        around = _conditions_at(model, estimate, part, shared, states)
-        residual[rows] = compute_residuals(model, estimate, part, around)
+    for states, rows, block in split_into_blocks(observations, 0):
+        around = _conditions_at(model, estimate, block, shared, states)
+        residual[rows] = compute_residuals(model, estimate, block, around)
     sensor_distance = np.linalg.norm(residual / noise.sensor_std(model.rows), axis=1)
     limit = np.quantile(sensor_distance[spread], _EXAMINED_QUANTILE)
     examined = spread | in_sample | (sensor_distance > limit)
     blocks = []
     linearized = linearize if include_parameters else linearize_coordinates
     columns = len(list_parameters(model, estimate))
-    for states, rows, part in split_into_blocks(
+    for states, rows, block in split_into_blocks(
         select_states(observations, examined), columns
     ):
-        around = _conditions_at(model, estimate, part, shared, states)
-        linear_model = linearized(model, estimate, part, around)
+        around = _conditions_at(model, estimate, block, shared, states)
+        linear_model = linearized(model, estimate, block, around)
         jacobian = linear_model.joint_jacobian
         blocks.append(
             _RowBlock(
@@ -339,14 +339,14 @@ def examine_residuals(
 def _conditions_at(
     model: Model,
     estimate: Estimate,
-    part: Observations,
+    block: Observations,
     shared: Conditions | None,
     states: slice,
 ) -> Conditions:
-    """Conditions of a part of the observations: its `states` of the shared ones."""
+    """Conditions of a block of the observations: its `states` of the shared ones."""
     if shared is None:
-        return evaluate_conditions(model, estimate, part.states)
-    if len(part.states) == len(shared.joint_angles):
+        return evaluate_conditions(model, estimate, block.states)
+    if len(block.states) == len(shared.joint_angles):
         return shared
     return select_conditions(shared, states)
 

@@ -298,9 +298,9 @@ def _minimize_expected_loss(
     )
     silence_loss = settings.missed_loss * probability.sum()
     name_loss = 1.0 - probability[0]
-    if silence_loss <= min(name_loss, class_losses.min()):
-        return bool(name_loss < class_losses.min()), ()
     best_class = ranked[: int(np.argmin(class_losses)) + 1]
+    if silence_loss <= min(name_loss, class_losses.min()):
+        best_class = ()
     return bool(name_loss < class_losses.min()), best_class
 
 

@@ -1,16 +1,16 @@
-"""What effects may depend on in each state of the robot: its loads, its motion, the
-approach, time and temperature.
+"""The conditions on which effects may depend in each state of the robot: its loads, its
+motion, the approach, time and temperature.
 
-The load on each coordinate is the generalized force J^T w of a wrench w (N, N m) by the
+The load on each coordinate is the generalized force J^T w of a wrench w (N, N m), by the
 principle of virtual work (Siciliano et al. 2009).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
@@ -18,34 +18,94 @@ from elastocal.mechanics.kinematics import Motion, compute_motion, multiply_vect
 from elastocal.mechanics.sites import Sites
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
     from elastocal.fitting.observations import States
 
 # Parameters of each mass that the robot file declares: the mass itself, and its first
 # moments along the three axes of its frame.
 MASS_PARAMETERS = 4
+_Value = TypeVar("_Value")
+
+
+class Cache(Generic[_Value]):
+    """Values by name, each computed when it is first needed.
+
+    Conditions that agree in everything on which the values depend share one cache.
+    """
+
+    def __init__(self, values: Mapping[str, _Value] | None = None) -> None:
+        self._values = dict(values or {})
+
+    def get(self, name: str, compute: Callable[[], _Value]) -> _Value:
+        """Return the value of this name; compute it if it is not known yet."""
+        if name not in self._values:
+            self._values[name] = compute()
+        return self._values[name]
+
+    def copy_with(self, values: Mapping[str, _Value]) -> Cache[_Value]:
+        """Copy the cache, with these values in place of its own."""
+        return Cache(self._values | dict(values))
+
+    def copy_without(self, *names: str) -> Cache[_Value]:
+        """Copy the cache without some values, which will be computed again."""
+        kept = self._values.keys() - set(names)
+        return Cache({name: self._values[name] for name in kept})
+
+
+class _CachedLoad:
+    """Decorator of a load of `Conditions` that is kept in their cache of loads."""
+
+    def __init__(self, compute: Callable[[Conditions], np.ndarray]) -> None:
+        self.compute = compute
+        self.__doc__ = compute.__doc__
+
+    def __get__(self, conditions: Conditions, owner: object = None) -> np.ndarray:
+        compute = partial(self.compute, conditions)
+        return conditions.loads.get(self.compute.__name__, compute)
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """Reference of the times and the progress of a campaign.
+
+    Attributes
+    ----------
+    time_zero_s : time of the first measurement, from which effects count the time.
+    row_span : first and last row of the campaign; None for those of the states.
+    """
+
+    time_zero_s: float = 0.0
+    row_span: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """Everything that an effect may depend on, for S states of the robot.
+    """Everything on which an effect may depend, for S states of the robot.
 
-    Loads are taken where the robot has yielded to them: at the displaced coordinates
-    behind `motion`, not at the commanded ones (the term K_C of the conservative
-    congruence transformation (Chen and Kao 2000)).
+    Loads are evaluated at the displaced coordinates behind `motion`, not at the commanded
+    ones: this is the term K_C of the conservative congruence transformation (Chen and Kao
+    2000). Use `replace_motion` and `select_conditions` to change the motion, because the
+    cached loads depend on it.
 
-    `compliance` (n,): joint compliances, rad/(N m). `joint_angles` (S, n): as
-    commanded, rad. `wrench` (S, 6): N, N m, at the last measuring point, base axes.
-    `motion`: of `Sites.followed`. `mass_corrections` (4 m,): by how much each of the
-    declared masses is off its robot file, kg, and then its first moments along the axes
-    of its frame beyond what goes with the mass, kg m. `approach` (S, n). `time_s` (S,):
-    since the first measurement to which the model was fitted. `temperature_c` (S,).
-    These three are NaN where they are not known; no law reads them that does not need
-    them. `progress` (S,): how far the campaign had come, from 0 at its first row to 1
-    at its last: see `progress_of`. `of_angles`: laws that go with the joint angles
-    alone, by the keys of their candidates; shared wherever the same states are under
-    other loads: see `Candidate.fixed`.
+    Attributes
+    ----------
+    compliance : joint compliances, (n,), rad/(N m).
+    joint_angles : commanded joint angles, (S, n), rad.
+    wrench : external wrench at the last measuring point, (S, 6), N and N m, base axes.
+    motion : motion of `Sites.followed`.
+    mass_corrections : errors of the declared masses, (4 m,): for each mass its error in
+        kg, then the errors of its first moments along the axes of its frame beyond those
+        that the error of the mass causes, kg m.
+    approach : sense in which each joint was approached, (S, n); NaN if it is unknown.
+    time_s : time since the first measurement to which the model was fitted, (S,); NaN if
+        it is unknown.
+    temperature_c : temperature, (S,), °C; NaN if it is unknown. Only laws that need
+        approach, time or temperature read them.
+    progress : progress of the campaign, (S,), see `compute_progress`.
+    laws : displacements by laws that depend on joint angles alone, see `Candidate.fixed`,
+        by the keys of their candidates.
+    loads : loads that have been computed, by name.
     """
 
     sites: Sites
@@ -58,16 +118,17 @@ class Conditions:
     time_s: np.ndarray
     temperature_c: np.ndarray
     progress: np.ndarray
-    of_angles: dict[str, list[dict[int, np.ndarray]]] = field(
-        default_factory=dict, repr=False, compare=False
+    laws: Cache[list[dict[int, np.ndarray]]] = field(
+        default_factory=Cache, repr=False, compare=False
     )
+    loads: Cache[np.ndarray] = field(default_factory=Cache, repr=False, compare=False)
 
     @property
-    def always(self) -> np.ndarray:
+    def ones(self) -> np.ndarray:
         """One in every state, ndarray (S,)."""
         return np.ones(len(self.joint_angles))
 
-    @cached_property
+    @_CachedLoad
     def load(self) -> np.ndarray:
         """Generalized force (N, N m) of the external wrench on every coordinate of the
         sites (equation 7), ndarray (S, C)."""
@@ -76,15 +137,17 @@ class Conditions:
     def load_by(
         self, wrench: np.ndarray, coordinates: slice = slice(None)
     ) -> np.ndarray:
-        """The same by another wrench (S, 6) at the last measuring point, on some of the
-        coordinates, ndarray (S, .)."""
-        acting = wrench.T.copy()
-        acting[3:] += np.cross(self.motion.position[0], acting[:3], axis=0)
+        """Compute the generalized force of a wrench (S, 6) at the last measuring point,
+        ndarray (S, number of coordinates)."""
+        wrench_at_base = wrench.T.copy()
+        wrench_at_base[3:] += np.cross(
+            self.motion.position[0], wrench_at_base[:3], axis=0
+        )
         return self.motion.generalized_forces(
-            self.sites.followed[0].after, acting, coordinates
+            self.sites.followed[0].after, wrench_at_base, coordinates
         ).T
 
-    @cached_property
+    @_CachedLoad
     def gravity(self) -> np.ndarray:
         """Generalized force of the declared masses on every coordinate of the sites,
         ndarray (S, C)."""
@@ -98,7 +161,7 @@ class Conditions:
         force = np.empty((coordinates, states))
         for start, end in pairwise([0, *edges.tolist(), coordinates]):
             carried = is_carried[start]
-            wrench = self._falling(
+            wrench = self._gravity_wrench(
                 float(masses[carried].sum()), first_moments[carried].sum(axis=0)
             )
             twist = self.motion.twist[:, start:end]
@@ -125,16 +188,16 @@ class Conditions:
     def gravity_of_corrections(
         self, coordinates: slice | list[int]
     ) -> Iterator[np.ndarray]:
-        """By how much `gravity` on some coordinates, in the order of the chain, grows
-        with the `mass_corrections`, per unit.
+        """Derivatives of `gravity` on some coordinates with respect to the
+        `mass_corrections`.
 
-        Yields for each mass (4, K', S), of the first of the coordinates, which it
-        loads.
+        The coordinates are in the order of the chain. Yields for each mass an array (4,
+        K', S) for the K' first of the coordinates, which the mass loads.
         """
         place = self.motion.place[coordinates]
         twist = self.motion.twist[:, coordinates]
         gravity = np.array(self.sites.gravity_m_s2)
-        by_kilogram = np.tensordot(gravity, twist[:3], 1)
+        force_per_kg = np.tensordot(gravity, twist[:3], 1)
         for body, mass in enumerate(self.sites.masses, self.sites.joints + 2):
             rotation = self.motion.rotation[body]
             loaded = np.searchsorted(place, self.sites.followed[body].after)
@@ -148,35 +211,36 @@ class Conditions:
                 moments,
             )
             forces = np.einsum("iks,ips->pks", twist[3:, :loaded], moments)
-            forces[0] += by_kilogram[:loaded]
+            forces[0] += force_per_kg[:loaded]
             yield forces
 
-    def _falling(self, mass: float, first: np.ndarray) -> np.ndarray:
-        """Wrench of gravity on a mass and its first moment about the base's origin (3,
-        S), ndarray (6, S)."""
-        wrench = np.empty((6, first.shape[1]))
+    def _gravity_wrench(self, mass: float, first_moment: np.ndarray) -> np.ndarray:
+        """Wrench of gravity on a mass with a first moment (3, S) about the base's origin,
+        ndarray (6, S)."""
+        wrench = np.empty((6, first_moment.shape[1]))
         gravity = np.array(self.sites.gravity_m_s2)[:, None]
         wrench[:3] = mass * gravity
-        multiply_vectors(first, gravity, wrench[3:])
+        multiply_vectors(first_moment, gravity, wrench[3:])
         return wrench
 
-    @cached_property
+    @_CachedLoad
     def usual_gravity(self) -> np.ndarray:
-        """Generalized force of the usual masses on every coordinate beyond the joints,
-        whose sag has its own law; (S, C)."""
-        found = np.zeros((self.motion.place.size, len(self.wrench)))
-        for end, mass in enumerate(self.sites.usual_masses, 1):
-            falling = self._falling(mass, mass * self.motion.position[end])
-            found += self.motion.generalized_forces(
-                self.sites.followed[end].after, falling
-            )
-        found[: self.sites.joints] = 0.0
-        return found.T
+        """Generalized force of the usual masses on every coordinate, ndarray (S, C).
 
-    @cached_property
+        It is zero on the joints, whose sag is an effect of its own.
+        """
+        force = np.zeros((self.motion.place.size, len(self.wrench)))
+        for end, mass in enumerate(self.sites.usual_masses, 1):
+            wrench = self._gravity_wrench(mass, mass * self.motion.position[end])
+            after = self.sites.followed[end].after
+            force += self.motion.generalized_forces(after, wrench)
+        force[: self.sites.joints] = 0.0
+        return force.T
+
+    @_CachedLoad
     def total(self) -> np.ndarray:
-        """External load and weight of the declared masses, or of usual ones, on every
-        coordinate of the sites, (S, C)."""
+        """Load by the external wrench and the declared or usual masses on every
+        coordinate of the sites, ndarray (S, C)."""
         if self.sites.usual_weight:
             weight = self.usual_gravity
         elif self.sites.masses:
@@ -186,142 +250,145 @@ class Conditions:
         # Without a wrench the load is zero and need not be computed.
         return self.load + weight if self.wrench.any() else weight
 
-    @cached_property
+    @_CachedLoad
     def mass_torques(self) -> np.ndarray:
-        """Torque on each joint per unit of each of the `mass_corrections`, ndarray (4
-        m, S, n)."""
-        found = np.zeros(
-            (
-                len(self.sites.masses),
-                MASS_PARAMETERS,
-                self.sites.joints,
-                len(self.wrench),
-            )
-        )
-        for each, forces in zip(
-            found, self.gravity_of_corrections(slice(self.sites.joints)), strict=True
-        ):
-            each[:, : forces.shape[1]] = forces
-        return found.reshape(-1, *found.shape[2:]).swapaxes(1, 2)
+        """Torque on each joint per unit of each of the `mass_corrections`, ndarray (4 m,
+        S, n)."""
+        masses = len(self.sites.masses)
+        joints = self.sites.joints
+        torques = np.zeros((masses, MASS_PARAMETERS, joints, len(self.wrench)))
+        forces_by_mass = self.gravity_of_corrections(slice(joints))
+        for mass, forces in enumerate(forces_by_mass):
+            torques[mass, :, : forces.shape[1]] = forces
+        return torques.reshape(-1, *torques.shape[2:]).swapaxes(1, 2)
 
     def weight(self, link: int, axis: int | None = None) -> np.ndarray:
-        """Torque on each joint of a kilogram at the far end of a link, or of a kilogram
-        metre along an axis there, (S, n)."""
+        """Torque on each joint by a kilogram at the far end of a link, or by a first
+        moment of a kilogram metre along an axis there, ndarray (S, n)."""
         end = 1 + link
-        first = (
-            self.motion.position[end]
-            if axis is None
-            else self.motion.rotation[end, :, axis]
-        )
-        falling = self._falling(float(axis is None), first)
+        if axis is None:
+            wrench = self._gravity_wrench(1.0, self.motion.position[end])
+        else:
+            wrench = self._gravity_wrench(0.0, self.motion.rotation[end, :, axis])
         return self.motion.generalized_forces(
-            self.sites.followed[end].after, falling, slice(self.sites.joints)
+            self.sites.followed[end].after, wrench, slice(self.sites.joints)
         ).T
 
 
 def compute_progress(
     states: States, row_span: tuple[int, int] | None = None
 ) -> np.ndarray:
-    """How far a campaign had come in each state, ndarray (S,): 0 at its first row, 1 at
-    its last.
+    """Compute the progress of a campaign in each state, ndarray (S,): 0 at its first row,
+    1 at its last.
 
-    `row_span` (int, int): these rows; those of the states without. States that have no
-    row come after them. Where no rows are known, poses count in the order of their
-    numbers.
+    Without `row_span`, first and last row are those of the states. States without a row
+    come after the campaign. If no rows are known at all, poses count in the order of
+    their numbers.
     """
     if not len(states) or (states.row is None and row_span is not None):
         return np.ones(len(states))
-    place = states.pose if states.row is None else states.row
-    first, last = (place.min(), place.max()) if row_span is None else row_span
-    return (place - first) / max(last - first, 1)
+    rows = states.pose if states.row is None else states.row
+    first, last = row_span or (rows.min(), rows.max())
+    return (rows - first) / max(last - first, 1)
 
 
 def build_conditions(
     sites: Sites,
     compliance: np.ndarray,
     states: States,
-    time_zero_s: float = 0.0,
+    *,
     mass_corrections: np.ndarray | None = None,
-    row_span: tuple[int, int] | None = None,
+    timeline: Timeline = Timeline(),
     coordinates: np.ndarray | None = None,
 ) -> Conditions:
-    """What effects may depend on, in some states.
+    """Build the conditions of states.
 
-    `compliance` (n,): rad/(N m). `time_zero_s`: from which effects count the time.
-    `mass_corrections` (4 m,): as in `Conditions`; zero without. `row_span` (int, int):
-    as in `progress_of`. `coordinates` (S, C): where the robot has yielded to; the
-    commanded poses without.
+    Parameters
+    ----------
+    sites : sites of the robot
+    compliance : joint compliances, (n,), rad/(N m)
+    states : S states
+    mass_corrections : as in `Conditions`, zero by default
+    timeline : reference of times and progress
+    coordinates : displaced coordinates, (S, C), by default those of the commanded poses
     """
     if coordinates is None:
         coordinates = sites.chain.at(states.joint_angles)
+    if mass_corrections is None:
+        mass_corrections = np.zeros(MASS_PARAMETERS * len(sites.masses))
     unknown = np.full(states.joint_angles.shape, np.nan)
+    time_s = unknown[:, 0]
+    if states.time_s is not None:
+        time_s = states.time_s - timeline.time_zero_s
     return Conditions(
         sites,
         np.asarray(compliance),
         states.joint_angles,
         states.wrench,
         compute_motion(sites.chain, coordinates, sites.followed),
-        np.zeros(MASS_PARAMETERS * len(sites.masses))
-        if mass_corrections is None
-        else mass_corrections,
+        mass_corrections,
         unknown if states.approach is None else states.approach,
-        unknown[:, 0] if states.time_s is None else states.time_s - time_zero_s,
+        time_s,
         unknown[:, 0] if states.temperature_c is None else states.temperature_c,
-        compute_progress(states, row_span),
+        compute_progress(states, timeline.row_span),
     )
 
 
 def select_conditions(conditions: Conditions, chosen: slice | np.ndarray) -> Conditions:
-    """Some of the states; `chosen` (S,) of bool."""
-    moved = conditions.motion
-    some = replace(
-        moved,
-        **{
-            name: getattr(moved, name)[..., chosen]
-            for name in ("position", "rotation", "twist")
-        },
+    """Select some of the states; `chosen` (S,) of bool."""
+    motion = conditions.motion
+    chosen_motion = replace(
+        motion,
+        position=motion.position[..., chosen],
+        rotation=motion.rotation[..., chosen],
+        twist=motion.twist[..., chosen],
     )
-    columns = (
-        "joint_angles",
-        "wrench",
-        "approach",
-        "time_s",
-        "temperature_c",
-        "progress",
+    return replace(
+        replace_motion(conditions, chosen_motion),
+        joint_angles=conditions.joint_angles[chosen],
+        wrench=conditions.wrench[chosen],
+        approach=conditions.approach[chosen],
+        time_s=conditions.time_s[chosen],
+        temperature_c=conditions.temperature_c[chosen],
+        progress=conditions.progress[chosen],
+        laws=Cache(),
     )
-    kept = {name: getattr(conditions, name)[chosen] for name in columns}
-    return replace(conditions, motion=some, of_angles={}, **kept)
+
+
+def replace_motion(conditions: Conditions, motion: Motion) -> Conditions:
+    """Replace the motion of the same states; the loads are computed again."""
+    return replace(conditions, motion=motion, loads=Cache())
 
 
 def replace_springs(
     conditions: Conditions, compliance: np.ndarray, mass_corrections: np.ndarray
 ) -> Conditions:
-    """The same states with other joint compliances (n,) and other errors of the
-    declared masses (4 m,)."""
-    same = np.array_equal(mass_corrections, conditions.mass_corrections)
-    if same and np.array_equal(compliance, conditions.compliance):
-        return conditions
-    changed = replace(
-        conditions, compliance=compliance, mass_corrections=mass_corrections
+    """Replace the joint compliances (n,) and the errors of the declared masses (4 m,).
+
+    Loads depend on the compliances only through the motion, which stays, so that all
+    loads that do not depend on the masses are kept.
+    """
+    loads = conditions.loads
+    if np.array_equal(mass_corrections, conditions.mass_corrections):
+        if np.array_equal(compliance, conditions.compliance):
+            return conditions
+    else:
+        loads = loads.copy_without("gravity", "total")
+    return replace(
+        conditions,
+        compliance=compliance,
+        mass_corrections=mass_corrections,
+        loads=loads,
     )
-    # What is known of the loads stays so: they do not depend on the springs but by way
-    # of the motion.
-    for name in ("load", "gravity", "total", "mass_torques"):
-        if name in vars(conditions) and (same or name not in ("gravity", "total")):
-            vars(changed)[name] = vars(conditions)[name]
-    return changed
 
 
 def replace_total_load(conditions: Conditions, total: np.ndarray) -> Conditions:
-    """The same states under another `Conditions.total` load, ndarray (S, C), whatever
-    makes it."""
-    changed = replace(conditions)
-    vars(changed).update(vars(conditions) | {"total": total})
-    return changed
+    """Replace the total load, ndarray (S, C), whatever causes it."""
+    return replace(conditions, loads=conditions.loads.copy_with({"total": total}))
 
 
 def find_offered_needs(sites: Sites, states: States) -> frozenset[str]:
-    """List which needs of effects the data meet.
+    """Find the needs of effects that the data meet.
 
     Returns
     -------

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from elastocal.effects.catalogue import list_effects
-from elastocal.effects.conditions import build_conditions
+from elastocal.effects.conditions import Timeline, build_conditions
 from elastocal.effects.protocol import Candidate
 from elastocal.figures.style import MILLI, PALETTE, create_panels, styled
 from elastocal.fitting.model import sum_displacements
@@ -165,7 +165,9 @@ def _compute_displacement(
     experiment: _Experiment,
 ) -> np.ndarray:
     """Displacement (S, 3) of the reflector in mm, base axes, by one effect."""
-    conditions = build_conditions(sites, compliance, experiment.states, row_span=(0, 1))
+    conditions = build_conditions(
+        sites, compliance, experiment.states, timeline=Timeline(row_span=(0, 1))
+    )
     sizes = np.array(
         [
             (parameter.sign or 1) * parameter.plausible

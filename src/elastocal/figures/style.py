@@ -9,7 +9,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from elastocal.io.atomic_writes import atomic_write
+from elastocal.io.atomic_writes import write_atomically
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -184,9 +184,9 @@ def save(figure: Figure, pdf: str, png: str, origin: Origin | None = None) -> No
         keywords = " ".join(map(str, vars(origin).values()))
         pdf_metadata |= {"Subject": origin.words, "Keywords": keywords}
         png_metadata |= {"Description": origin.words, "Source": origin.commit}
-    with atomic_write(pdf) as partial:
+    with write_atomically(pdf) as partial:
         figure.savefig(partial, format="pdf", metadata=pdf_metadata)
-    with atomic_write(png) as partial:
+    with write_atomically(png) as partial:
         figure.savefig(partial, format="png", dpi=150, metadata=png_metadata)
 
 
@@ -207,6 +207,6 @@ def save_svg(figure: Figure, path: str) -> None:
     """
     with (
         rc_context({"svg.hashsalt": "elastocal", "svg.fonttype": "none"}),
-        atomic_write(path) as partial,
+        write_atomically(path) as partial,
     ):
         figure.savefig(partial, format="svg", metadata={"Date": None})

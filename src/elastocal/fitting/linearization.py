@@ -22,6 +22,7 @@ from scipy.sparse import csr_array
 from elastocal.effects.conditions import (
     MASS_PARAMETERS,
     Conditions,
+    replace_motion,
     replace_springs,
     replace_total_load,
 )
@@ -360,7 +361,7 @@ def linearize_coordinates(
         subtract_prediction(estimate, observations, position, rotation),
         columns,
         coordinates,
-        replace(conditions, motion=moved),
+        replace_motion(conditions, moved),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,8 +13,10 @@ from elastocal.campaigns.campaign import Campaign, assemble_campaign, build_meas
 from elastocal.effects.catalogue import candidates_on, declared_candidates
 from elastocal.effects.conditions import (
     MASS_PARAMETERS,
+    Timeline,
     build_conditions,
     find_offered_needs,
+    replace_motion,
     replace_springs,
 )
 from elastocal.effects.elastic import joint_compliance
@@ -335,19 +338,16 @@ def evaluate_conditions(
         model.sites,
         get_joint_compliances(model, estimate),
         states,
-        model.time_zero_s,
-        get_mass_corrections(model, estimate),
-        model.row_span,
-        coordinates,
+        mass_corrections=get_mass_corrections(model, estimate),
+        timeline=Timeline(model.time_zero_s, model.row_span),
+        coordinates=coordinates,
     )
     if coordinates is not None:
         return conditions
     for _ in range(_LOAD_ITERATIONS):
         displaced = compute_displaced_coordinates(model, estimate, conditions)
-        conditions = replace(
-            conditions,
-            motion=compute_motion(model.sites.chain, displaced, model.sites.followed),
-        )
+        motion = compute_motion(model.sites.chain, displaced, model.sites.followed)
+        conditions = replace_motion(conditions, motion)
     return conditions
 
 
@@ -450,9 +450,7 @@ def evaluate_basis_functions(
     """
     if not effect.fixed:
         return effect.displacement(conditions, *shapes)
-    if effect.key not in conditions.of_angles:
-        conditions.of_angles[effect.key] = effect.displacement(conditions)
-    return conditions.of_angles[effect.key]
+    return conditions.laws.get(effect.key, partial(effect.displacement, conditions))
 
 
 def predict(

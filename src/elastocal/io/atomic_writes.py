@@ -72,7 +72,7 @@ def remove_partials(folder: str | Path) -> None:
 
 
 @contextmanager
-def atomic_write(path: str | Path, *, empty: bool = False) -> Iterator[str]:
+def write_atomically(path: str | Path, *, empty: bool = False) -> Iterator[str]:
     """Give the block an unpredictable name in the same folder to write to, and rename
     the file afterwards. If the block raises, nothing is left behind.
 
@@ -134,7 +134,7 @@ def write_together(folder: str | Path, names: Iterable[str]) -> Iterator[Path]:
 def write_text(path: str | Path, text: str) -> None:
     """Write a text in UTF-8, atomically."""
     with (
-        atomic_write(path, empty=not text) as partial,
+        write_atomically(path, empty=not text) as partial,
         open(partial, "w", encoding="utf-8") as file,
     ):
         file.write(text)

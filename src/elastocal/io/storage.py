@@ -17,7 +17,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from elastocal.errors import InputError
-from elastocal.io.atomic_writes import atomic_write
+from elastocal.io.atomic_writes import write_atomically
 from elastocal.io.texts import check_file
 
 # One value or an array for each column.
@@ -96,7 +96,7 @@ def write_table(
         "use_byte_stream_split": [name for name in is_float if is_float[name]],
     }
     with (
-        atomic_write(path) as partial,
+        write_atomically(path) as partial,
         pq.ParquetWriter(partial, fields, **options) as writer,
     ):
         for block in blocks:
@@ -191,18 +191,13 @@ def read_table(
         key = ", ".join(where)
         finding = ", ".join(map(repr, where.values()))
         raise InputError(path, key, finding, "values in the file")
-    wanted = [
-        column for column in schema.columns if columns is None or column.name in columns
-    ]
-    if not blocks:
-        return {
-            column.name: np.zeros(0, object if column.is_text else column.type)
-            for column in wanted
-        }
-    names = [column.name for column in wanted]
     table = {}
-    for name in names:
-        table[name] = np.concatenate([block[name] for block in blocks])
+    for column in schema.columns:
+        if columns is None or column.name in columns:
+            # A table without blocks has columns of the right types.
+            empty = np.zeros(0, object if column.is_text else column.type)
+            values = [block[column.name] for block in blocks]
+            table[column.name] = np.concatenate([empty, *values])
     return table
 
 
@@ -326,21 +321,13 @@ def _check_block(
 
 def _check_values(path: str | Path, column: Column, values: np.ndarray) -> None:
     """Refuse the first value that is not finite or below the minimum."""
+    checks = {}
     if not column.missing and not column.is_text:
-        _check_rows(path, column, values, np.isfinite(values), "finite numbers")
+        checks["finite numbers"] = np.isfinite(values)
     if column.minimum is not None:
-        is_allowed = values >= column.minimum
-        _check_rows(path, column, values, is_allowed, f">= {column.minimum}")
-
-
-def _check_rows(
-    path: str | Path,
-    column: Column,
-    values: np.ndarray,
-    is_allowed: np.ndarray,
-    allowed: str,
-) -> None:
-    if not is_allowed.all():
-        row = int(np.argmin(is_allowed))
-        key = f"column {column.name}, row {row}"
-        raise InputError(path, key, str(values[row]), allowed)
+        checks[f">= {column.minimum}"] = values >= column.minimum
+    for allowed, is_allowed in checks.items():
+        if not is_allowed.all():
+            row = int(np.argmin(is_allowed))
+            key = f"column {column.name}, row {row}"
+            raise InputError(path, key, str(values[row]), allowed)

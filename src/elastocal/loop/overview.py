@@ -167,7 +167,13 @@ def _describe_gross_errors(
 
 
 def _describe_misplaced_frames(declared: Fit, case: Case) -> list[str]:
-    frames = find_misplaced_frames(_with_base(declared, case), case.campaign)
+    """Return sentences on misplaced frames, after a fit of the base if the campaign
+    declares its placement."""
+    base = case.candidates.get("base_placement")
+    if base is not None and case.campaign.frame == "base":
+        model = replace(declared.model, effects=(*declared.model.effects, base))
+        declared = fit_model(model, case.observations, declared.noise)
+    frames = find_misplaced_frames(declared, case.campaign)
     return [frame.sentence for frame in frames]
 
 
@@ -220,19 +226,6 @@ def _describe_declared_model(declared: Fit) -> list[tuple[str, str]]:
     ]
 
 
-def _with_base(declared: Fit, case: Case) -> Fit:
-    """Return the declared model with a fitted placement of the base, if the campaign
-    declares one."""
-    base = case.candidates.get("base_placement")
-    if base is None or case.campaign.frame != "base":
-        return declared
-    return fit_model(
-        replace(declared.model, effects=(*declared.model.effects, base)),
-        case.observations,
-        declared.noise,
-    )
-
-
 def _count_poses(measurements: Measurements) -> int:
     return len(list_poses(measurements)[0])
 
@@ -271,7 +264,9 @@ def _list_shortcomings(
             f"{FEWEST_HELD_OUT} or more would"
         )
     forces = states.wrench[states.wrench.any(axis=1), :3]
-    if len(forces) and _are_collinear(forces):
+    # A single force has a single singular value.
+    largest, second = [*np.linalg.svd(forces, compute_uv=False), 0.0, 0.0][:2]
+    if len(forces) and second < _COLLINEAR_SHARE * largest:
         shortcomings.append(
             "all loads pull along one line: compliances across it are not shown"
         )
@@ -301,11 +296,3 @@ def _warn_of_few_poses(declared: Fit, poses: int) -> list[str]:
         f"than these. Measure about {needed_poses} poses to fit, or orientations too, "
         "or declare fewer errors"
     ]
-
-
-def _are_collinear(forces: np.ndarray) -> bool:
-    """Whether forces (N, 3) pull along one line."""
-    singular_values = np.linalg.svd(forces, compute_uv=False)
-    # A single force has a single singular value.
-    largest, second = [*singular_values, 0.0][:2]
-    return bool(second < _COLLINEAR_SHARE * largest)

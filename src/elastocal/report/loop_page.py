@@ -126,6 +126,15 @@ def _draw_poses(selection: Mapping[str, np.ndarray], robot: Robot) -> dict[str, 
     }
 
 
+def _find_target_rows(
+    selection: Mapping[str, np.ndarray], rows: np.ndarray
+) -> list[int]:
+    """Return the first of some rows for each target."""
+    first = np.unique(selection["target"][rows], return_index=True)[1]
+    target_rows: list[int] = rows[first].tolist()
+    return target_rows
+
+
 def _stack_residuals_um(selection: Mapping[str, np.ndarray], stage: str) -> np.ndarray:
     """Return the position residuals (N, 3) of a stage, µm."""
     components = [selection[f"{stage}_d{axis}"] for axis in "xyz"]
@@ -168,23 +177,10 @@ def write_loop_page(
     write_text(path, text)
 
 
-def _find_target_rows(
-    selection: Mapping[str, np.ndarray], rows: np.ndarray
-) -> list[int]:
-    """Return the first of some rows for each target."""
-    first = np.unique(selection["target"][rows], return_index=True)[1]
-    return [int(row) for row in rows[first]]
-
-
 def _spread(count: int, limit: int) -> np.ndarray:
     """Return at most `limit` indices below `count`, evenly spread."""
     indices = np.linspace(0, count - 1, min(count, limit))
     return np.unique(indices.round().astype(int))
-
-
-def _round_values(values: np.ndarray) -> list[float]:
-    """Round to five significant digits."""
-    return [float(f"{value:.5g}") for value in values]
 
 
 def _list_quantities(
@@ -208,12 +204,10 @@ def _list_quantities(
     quantities.append(("order of measurement", "row", selection["row"]))
     if "time_s" in selection:
         quantities.append(("time", "s", selection["time_s"]))
-    return [
-        {
-            "name": name,
-            "unit": unit,
-            "values": _round_values(values),
-        }
-        for name, unit, values in quantities
-        if np.isfinite(values).all() and np.ptp(values) > 0
-    ]
+    varying = []
+    for name, unit, values in quantities:
+        if np.isfinite(values).all() and np.ptp(values) > 0:
+            # Five significant digits suffice for a plot.
+            rounded = [float(f"{value:.5g}") for value in values]
+            varying.append({"name": name, "unit": unit, "values": rounded})
+    return varying

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import typst
 
-from elastocal.io.atomic_writes import atomic_write
+from elastocal.io.atomic_writes import write_atomically
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -126,7 +126,7 @@ def compile_document(
             Path(folder, f"{name}.json").write_text(text, encoding="utf-8")
         for figure in figures:
             shutil.copy(figure, folder)
-        with atomic_write(path) as partial:
+        with write_atomically(path) as partial:
             typst.compile(
                 source, output=Path(partial), format="pdf", root=source.parent
             )

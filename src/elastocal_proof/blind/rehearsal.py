@@ -26,7 +26,7 @@ from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.tables import LARGEST_BYTES
 from elastocal.errors import InputError
 from elastocal.exchange.target_path import read_target_path
-from elastocal.io.atomic_writes import atomic_write, check_places
+from elastocal.io.atomic_writes import check_places, write_atomically
 from elastocal.io.texts import read_text
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.report.words import format_joints, join_items, name_effect
@@ -497,5 +497,5 @@ def _read_table(path: Path) -> pd.DataFrame:
 
 
 def _write_table(path: Path, table: pd.DataFrame) -> None:
-    with atomic_write(path) as partial:
+    with write_atomically(path) as partial:
         table.to_csv(partial, index=False)

@@ -1,2 +1,1 @@
-"""Figures of blind proof, closed loop and league: tables in, PDF out; computes
-nothing."""
+"""Figures of the blind benchmark, the closed loop and the benchmark of methods."""

@@ -1,5 +1,5 @@
-"""Pictures of the blind proof: figures against targets, probabilities against
-frequencies, power; and of the closed loop."""
+"""Draw the figures of the blind benchmark and of the closed loop: rates against their
+targets, stated probabilities against frequencies, power, and errors after correction."""
 
 from __future__ import annotations
 
@@ -30,27 +30,32 @@ from elastocal_proof.blind.summary import iterate_rows, select_targets
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _COLOR = PALETTE[0]
+_TARGET_COLOR = "#cfe8d5"
 _ROBOTS = {PROOF: "robots of the proof", TUNED: "robots on which it was developed"}
-_AIM = "#cfe8d5"
-_LINE = 40
 _PER_CENT = 100.0
-_FARTHEST = 10.0
+# Number of letters after which a label of a row is wrapped.
+_LABEL_WIDTH = 40
+# End of the drawn range of a target without an upper bound.
+_MAX_TARGET = 10.0
+# Smallest drawn width of a target's range, so that a single value can be seen.
+_MIN_TARGET_WIDTH = 0.8
 _PANELS = {
     "oracle_detected": "the oracle\ndetects",
     "detected": "detected",
     "holds_truth": "right name, alone\nor in a class",
     "named_right": "right name alone",
 }
-# Never black, so that the numbers can be read everywhere.
-_SHARES = LinearSegmentedColormap.from_list(
+# Never black, so that the numbers are legible everywhere.
+_SHARE_COLORS = LinearSegmentedColormap.from_list(
     "shares", ["#ffffff", "#c6dbef", "#4292c6", "#08519c"]
 )
-_LEAST_WRITTEN = 0.045
+# Smaller shares are not written into their cells.
+_MIN_WRITTEN_SHARE = 0.045
+# Name of all effects, groups or robots together.
 _ALL = "all"
 _MODELS = {
     "uncorrected": "uncorrected",
@@ -60,49 +65,42 @@ _MODELS = {
     "true": "true model (floor)",
 }
 _PARTS = {"unloaded": "unloaded", "loaded": "under loads", "milling": "milling path"}
+# Vertical distance between the marks of two robots, in rows.
+_MARK_DISTANCE = 0.22
 
 
 @styled
 def draw_targets(summary: pd.DataFrame) -> Figure:
-    """Every figure of summary.csv that has a target, with its interval and the range
-    that the target leaves."""
-    aimed = select_targets(summary)
-    ratio = aimed.quantity.str.contains("over the oracle")
-    names = [
-        list(dict.fromkeys(part.quantity)) for part in (aimed[~ratio], aimed[ratio])
-    ]
-    # Shares of what the best analyst finds may exceed all of it.
-    largest = max(
-        102.0,
-        1.05 * _PER_CENT * np.nanmax(aimed[~ratio].high.to_numpy(float), initial=0.0),
-    )
-    heights = [max(len(part), 1) for part in names]
+    """Draw every quantity of summary.csv that has a target, with its interval and the
+    range of the target."""
+    targets = select_targets(summary)
+    is_ratio = targets.quantity.str.contains("over the oracle")
+    shares = targets[~is_ratio]
+    ratios = targets[is_ratio]
+    heights = [max(table.quantity.nunique(), 1) for table in (shares, ratios)]
     figure, axes = create_panels(2, 1, 32 + 7.4 * sum(heights), height_ratios=heights)
-    _dots(axes[0, 0], aimed[~ratio], names[0], lambda value: _PER_CENT * value)
+    _draw_intervals(axes[0, 0], shares, lambda share: _PER_CENT * share)
+    # A share of the best analyst's detections may exceed 100 %.
+    largest_share = _PER_CENT * np.nanmax(shares.high.to_numpy(float), initial=0.0)
     axes[0, 0].set(
-        xlim=(-2, largest),
+        xlim=(-2, max(102.0, 1.05 * largest_share)),
         xlabel="share of cases, or of what the best analyst finds (%)",
     )
-    _dots(axes[1, 0], aimed[ratio], names[1], lambda value: _PER_CENT * (value - 1.0))
-    farthest = np.nanmax(
-        np.abs(
-            _PER_CENT * (aimed[ratio][["rate", "low", "high"]].to_numpy(float) - 1.0)
-        ),
-        initial=6.0,
+    _draw_intervals(axes[1, 0], ratios, lambda ratio: _PER_CENT * (ratio - 1.0))
+    excess = _PER_CENT * (ratios[["rate", "low", "high"]].to_numpy(float) - 1.0)
+    limit = 1.1 * np.nanmax(np.abs(excess), initial=6.0)
+    axes[1, 0].set(xlim=(-limit, limit), xlabel="held-out RMS above the oracle's (%)")
+    interval = Line2D(
+        [],
+        [],
+        color=_COLOR,
+        marker="o",
+        markersize=4.5,
+        linewidth=1.2,
+        label=_ROBOTS[summary.robots.iloc[0]],
     )
-    axes[1, 0].set(
-        xlim=(-1.1 * farthest, 1.1 * farthest),
-        xlabel="held-out RMS above the oracle's (%)",
-    )
-    label = _ROBOTS[summary.robots.iloc[0]]
-    handles: list[Artist] = [
-        Line2D(
-            [], [], color=_COLOR, marker="o", markersize=4.5, linewidth=1.2, label=label
-        )
-    ]
-    handles.append(Patch(color=_AIM, label="target"))
     figure.legend(
-        handles=handles,
+        handles=[interval, Patch(color=_TARGET_COLOR, label="target")],
         title="bars are 95 % intervals",
         title_fontsize=7.5,
         loc="outside lower center",
@@ -111,52 +109,49 @@ def draw_targets(summary: pd.DataFrame) -> Figure:
     return figure
 
 
-def _dots(
-    axis: Axes, rows: pd.DataFrame, names: list[str], scaled: Callable[[float], float]
+def _draw_intervals(
+    axis: Axes, table: pd.DataFrame, scale: Callable[[float], float]
 ) -> None:
-    for row in iterate_rows(rows):
-        place = names.index(row.quantity)
-        # A target without an upper end goes as far as anything is drawn.
-        low = scaled(row.target_low)
-        high = scaled(min(row.target_high, _FARTHEST))
-        # A target of a single value is a line that can be seen.
+    """Draw rates with their intervals, a row for each quantity."""
+    names = list(dict.fromkeys(table.quantity))
+    for row in iterate_rows(table):
+        height = names.index(row.quantity)
+        low = scale(row.target_low)
+        high = scale(min(row.target_high, _MAX_TARGET))
         axis.barh(
-            place,
-            max(high - low, 0.8),
-            left=low - (0.4 if high == low else 0.0),
+            height,
+            max(high - low, _MIN_TARGET_WIDTH),
+            left=low - (0.5 * _MIN_TARGET_WIDTH if high == low else 0.0),
             height=0.86,
-            color=_AIM,
+            color=_TARGET_COLOR,
             zorder=0,
         )
         if not np.isfinite(row.rate):
-            # The interval of nothing is everything, which would look like a result.
-            at = "axes fraction", "data"
+            # Without cases the interval holds every value, which would look like a
+            # result.
             axis.annotate(
                 "no cases",
-                (0.01, place),
-                xycoords=at,
+                (0.01, height),
+                xycoords=("axes fraction", "data"),
                 va="center",
                 color=_COLOR,
                 fontsize=7,
             )
             continue
-        axis.plot(
-            [scaled(row.low), scaled(row.high)],
-            [place, place],
-            color=_COLOR,
-            linewidth=1.2,
-        )
-        axis.plot(scaled(row.rate), place, "o", color=_COLOR, markersize=4.2)
+        interval = [scale(row.low), scale(row.high)]
+        axis.plot(interval, [height, height], color=_COLOR, linewidth=1.2)
+        axis.plot(scale(row.rate), height, "o", color=_COLOR, markersize=4.2)
     axis.set(yticks=range(len(names)), ylim=(len(names) - 0.4, -0.6))
-    axis.set_yticklabels([textwrap.fill(name, _LINE) for name in names], fontsize=7)
+    labels = [textwrap.fill(name, _LABEL_WIDTH) for name in names]
+    axis.set_yticklabels(labels, fontsize=7)
     axis.grid(visible=False, axis="y")
     axis.set_axisbelow(True)
 
 
 @styled
 def draw_reliability(reliability: pd.DataFrame) -> Figure:
-    """Shares of cases whose most probable set of mechanisms is true, against what was
-    stated, and numbers of cases."""
+    """Draw how often the most probable set of mechanisms is true against its stated
+    probability, and the numbers of cases."""
     rows = reliability[reliability.group == _ALL]
     if rows.empty:
         return draw_note("No verdict of this run states a probability.")
@@ -164,17 +159,16 @@ def draw_reliability(reliability: pd.DataFrame) -> Figure:
     shares = axes[0, 0]
     counts = axes[1, 0]
     shares.plot([0, 1], [0, 1], color="black", linewidth=0.8, linestyle=":")
-    errors = [rows.rate - rows.low, rows.high - rows.rate]
-    width = rows["to"] - rows["from"]
     shares.errorbar(
         rows.stated,
         rows.rate,
-        errors,
+        [rows.rate - rows.low, rows.high - rows.rate],
         color=_COLOR,
         marker="o",
         markersize=4.5,
         linewidth=1.2,
     )
+    width = rows["to"] - rows["from"]
     counts.bar(
         rows["from"] + 0.1 * width, rows.cases, 0.8 * width, align="edge", color=_COLOR
     )
@@ -189,27 +183,25 @@ def draw_reliability(reliability: pd.DataFrame) -> Figure:
 
 @styled
 def draw_power(rates: pd.DataFrame) -> Figure:
-    """Shares of rates.csv detected and named for each effect and size, beside the
-    oracle that knows the effect."""
+    """Draw the shares of rates.csv that are detected and named, for each effect and
+    size, and those of the oracle, which knows the effect."""
     single = rates[rates.group == "single"]
     if single.empty:
         return draw_note("This run has no case with one effect.")
-    table = single.set_index(["truth", "level"])
     levels = sorted(single.level.unique())
-    at_largest = single[single.level == max(levels)].set_index("truth")["named_right"]
-    effects = sorted(
-        (name for name in at_largest.index if name != _ALL),
-        key=lambda name: (-at_largest[name], name),
-    )
-    effects += [_ALL] * (_ALL in set(single.truth))
+    largest = single[(single.level == max(levels)) & (single.truth != _ALL)]
+    # The effects that are named most often come first, all effects together last.
+    effects = largest.sort_values(["named_right", "truth"], ascending=[False, True])[
+        "truth"
+    ].tolist()
+    if _ALL in set(single.truth):
+        effects.append(_ALL)
+    cells = pd.MultiIndex.from_product([effects, levels])
+    table = single.set_index(["truth", "level"]).reindex(cells)
     figure, axes = create_panels(1, len(_PANELS), 34 + 4.6 * len(effects), sharey=True)
     for axis, (column, title) in zip(axes[0], _PANELS.items(), strict=True):
-        shares = (
-            table[column]
-            .reindex(pd.MultiIndex.from_product([effects, levels]))
-            .to_numpy(float)
-        )
-        _heat(axis, shares.reshape(len(effects), len(levels)))
+        shares = table[column].to_numpy(float)
+        _draw_cells(axis, shares.reshape(len(effects), len(levels)))
         axis.set(
             xticks=range(len(levels)),
             yticks=range(len(effects)),
@@ -219,81 +211,90 @@ def draw_power(rates: pd.DataFrame) -> Figure:
         axis.set_xticklabels([f"{level:g}" for level in levels])
         if _ALL in effects:
             axis.axhline(len(effects) - 1.5, color="black", linewidth=0.8)
-    raw = set(single[single.level_of == "raw"].truth)
-    known = {_ALL: "all effects"}
-    labels = [
-        known.get(name, name.replace("_", " ")) + (" *" if name in raw else "")
-        for name in effects
-    ]
-    axes[0, 0].set_yticklabels(labels, fontsize=7)
-    words = "Numbers are shares of cases in %."
-    if raw:
-        words += "\n* Wholly absorbed by the joint compliances: the size is that before absorption; not among all effects."
-    figure.supxlabel(words, fontsize=7)
+    absorbed = set(single[single.level_of == "raw"].truth)
+    axes[0, 0].set_yticklabels(
+        [_label_effect(name, absorbed) for name in effects], fontsize=7
+    )
+    caption = "Numbers are shares of cases in %."
+    if absorbed:
+        caption += (
+            "\n* Wholly absorbed by the joint compliances: the size is that before"
+            " absorption; not among all effects."
+        )
+    figure.supxlabel(caption, fontsize=7)
     return figure
 
 
-def _heat(axis: Axes, shares: np.ndarray) -> None:
+def _label_effect(name: str, absorbed: set[str]) -> str:
+    label = "all effects" if name == _ALL else name.replace("_", " ")
+    return f"{label} *" if name in absorbed else label
+
+
+def _draw_cells(axis: Axes, shares: np.ndarray) -> None:
+    """Draw a heat map with the shares, in per cent, in its cells."""
     axis.imshow(
         np.ma.masked_invalid(shares),
-        cmap=_SHARES,
+        cmap=_SHARE_COLORS,
         vmin=0,
         vmax=1,
         interpolation="nearest",
         aspect="auto",
     )
-    for row, column in np.argwhere(np.nan_to_num(shares) >= _LEAST_WRITTEN):
-        ink = choose_ink(_SHARES(shares[row, column]))
-        text = f"{_PER_CENT * shares[row, column]:.0f}"
-        axis.text(column, row, text, ha="center", va="center", fontsize=6.5, color=ink)
+    for row, column in np.argwhere(np.nan_to_num(shares) >= _MIN_WRITTEN_SHARE):
+        share = shares[row, column]
+        axis.text(
+            column,
+            row,
+            f"{_PER_CENT * share:.0f}",
+            ha="center",
+            va="center",
+            fontsize=6.5,
+            color=choose_ink(_SHARE_COLORS(share)),
+        )
     axis.tick_params(length=0)
     axis.grid(visible=False)
     axis.spines[:].set_visible(False)
 
 
 def draw_blind(job: Any) -> None:
-    """All pictures of the proof, by their names."""
+    """Draw all figures of the blind benchmark."""
     for name, draw, table in (
         ("targets", draw_targets, "summary"),
         ("reliability", draw_reliability, "reliability"),
         ("power", draw_power, "rates"),
     ):
         figure = draw(pd.read_csv(job.input[table]))
-        save(
-            figure,
-            job.output[f"{name}_pdf"],
-            job.output[name],
-            Origin(**job.config["origin"]),
-        )
+        origin = Origin(**job.config["origin"])
+        save(figure, job.output[f"{name}_pdf"], job.output[name], origin)
 
 
 @styled
 def draw_correction_errors(table: pd.DataFrame, names: Mapping[str, str]) -> Figure:
-    """What a robot misses after its targets were corrected, by part and by the model
-    that corrected them.
+    """Draw the errors of robots after their targets were corrected.
 
-    `names`: of the robots, by those of their files.
+    Each test has a panel, and each correcting model a row.
+
+    Parameters
+    ----------
+    table
+        Errors by robot, test (column ``part``) and model.
+    names
+        Names of the robots by those of their files.
     """
-    robots = [robot for robot in dict.fromkeys(table["robot"]) if robot != "all"]
+    robots = [robot for robot in dict.fromkeys(table["robot"]) if robot != _ALL]
+    heights = np.arange(len(_MODELS))[::-1]
     figure, axes = create_panels(1, len(_PARTS), 62, sharey=True, sharex=True)
-    for axis, (part, words) in zip(axes[0], _PARTS.items(), strict=True):
+    for axis, (test, title) in zip(axes[0], _PARTS.items(), strict=True):
         for number, robot in enumerate(robots):
-            mine = (
-                table[(table["part"] == part) & (table["robot"] == robot)]
-                .set_index("model")
-                .loc[list(_MODELS)]
-            )
-            place = np.arange(len(_MODELS))[::-1] + 0.22 * (
-                0.5 * (len(robots) - 1) - number
-            )
-            limits = np.abs(
-                mine[["rms_mm_low", "rms_mm_high"]].to_numpy().T
-                - mine["rms_mm"].to_numpy()
-            )
+            chosen = (table["part"] == test) & (table["robot"] == robot)
+            rows = table[chosen].set_index("model").loc[list(_MODELS)]
+            rms = rows["rms_mm"].to_numpy()
+            limits = rows[["rms_mm_low", "rms_mm_high"]].to_numpy().T
+            offset = _MARK_DISTANCE * (0.5 * (len(robots) - 1) - number)
             axis.errorbar(
-                mine["rms_mm"],
-                place,
-                xerr=limits,
+                rms,
+                heights + offset,
+                xerr=np.abs(limits - rms),
                 fmt="o",
                 ms=3.5,
                 lw=1.2,
@@ -302,18 +303,19 @@ def draw_correction_errors(table: pd.DataFrame, names: Mapping[str, str]) -> Fig
             )
         axis.set_xscale("log")
         axis.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        axis.set_title(words)
+        axis.set_title(title)
         axis.set_xlabel("position error, RMS (mm)")
-    axes[0, 0].set_yticks(np.arange(len(_MODELS))[::-1], list(_MODELS.values()))
-    handles, labels = axes[0, 0].get_legend_handles_labels()
+    axes[0, 0].set_yticks(heights, list(_MODELS.values()))
     figure.legend(
-        handles, labels, loc="outside lower center", ncols=max(len(robots), 1)
+        *axes[0, 0].get_legend_handles_labels(),
+        loc="outside lower center",
+        ncols=max(len(robots), 1),
     )
     return figure
 
 
 def draw_closed_loop(job: Any) -> None:
-    """The picture, from reports/closed_loop/closed_loop.csv."""
+    """Draw the figure from reports/closed_loop/closed_loop.csv."""
     names = {Path(path).stem: read_robot(Path(path)).name for path in job.input.robots}
     figure = draw_correction_errors(pd.read_csv(job.input.summary), names)
     save(figure, job.output.figure, job.output.picture, Origin(**job.config["origin"]))

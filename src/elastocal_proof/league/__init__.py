@@ -1,2 +1,2 @@
-"""The league: every method on every public data set, by the same folds; who predicts
-poses best that it has not seen."""
+"""The benchmark of calibration methods: each predicts the same held-out poses of each
+public data set."""

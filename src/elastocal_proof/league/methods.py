@@ -1,5 +1,5 @@
-"""Methods of the league on the same folds: a physical model, and perhaps a regression
-on what it leaves of poses not seen."""
+"""Fit the methods of the benchmark to the same folds: a physical model, and optionally
+a regression of its residual, which predict the held-out poses."""
 
 from __future__ import annotations
 
@@ -43,9 +43,12 @@ from elastocal.validation.transfer import transfer_fit
 from elastocal_proof.league.schemas import ENTRIES, FOLDS, MECHANISMS
 
 Columns = Mapping[str, np.ndarray]
+# Splits: held-out poses are drawn at random, are a block of joint space, or are those
+# of another session of the same robot.
 RANDOM = "random"
 BLOCKS = "blocks"
 SESSION = "session"
+# Physical models, see `Method`.
 FRAMES = "frames"
 GEOMETRY = "geometry"
 DIAGNOSIS = "diagnosis"
@@ -53,30 +56,45 @@ DIAGNOSIS = "diagnosis"
 
 @dataclass(frozen=True)
 class DataSet:
-    """A data set as its tables hold it: descriptions of the campaign, columns of all
-    measurements (N,), and `dealt` (P,)."""
+    """A data set of the benchmark as its tables hold it.
+
+    Attributes
+    ----------
+    descriptions
+        Descriptions of robot and campaign.
+    columns
+        Columns (N,) of all measurements.
+    folds
+        Columns (P,) of `deal_folds`.
+    """
 
     descriptions: Mapping[str, Any]
     columns: Columns
-    dealt: Columns
+    folds: Columns
 
-    def case(self, chosen: np.ndarray | slice = slice(None)) -> Case:
-        """A case of some of the measurements, or of all."""
-        return build_case(
-            self.descriptions,
-            {name: values[chosen] for name, values in self.columns.items()},
-        )
+    def build_case(self, chosen: np.ndarray | slice = slice(None)) -> Case:
+        """Build a case of the chosen measurements, by default of all."""
+        columns = {name: values[chosen] for name, values in self.columns.items()}
+        return build_case(self.descriptions, columns)
 
 
 @dataclass(frozen=True)
 class Method:
-    """A method of the league.
+    """A method of the benchmark.
 
-    `physics`: what is fitted first: frames and targets alone; what the campaign
-    declares too, such as geometry; or what a diagnosis of the training poses finds.
-    `regression`: of `remainder`, fitted to what that leaves. `within_range`: whether it
-    is left out where a pose lies outside the range of those fitted. `words`: what
-    tables and pictures call the method.
+    Attributes
+    ----------
+    physics
+        Model that is fitted first: "frames" and targets alone; "geometry" and
+        everything else that the campaign declares; or the model that a "diagnosis" of
+        the training poses finds.
+    regression
+        Of `residual_model`, fitted to the residual of the physical model.
+    within_range
+        Whether the regression is not applied to poses outside the range of the training
+        poses.
+    words
+        Name of the method in tables and figures.
     """
 
     physics: str
@@ -88,7 +106,7 @@ class Method:
 def load_data_set(
     descriptions_path: str | Path, measurements_path: str | Path, folds_path: str | Path
 ) -> DataSet:
-    """Read a data set from files as `deal_league_folds` wrote them."""
+    """Read a data set from the files of `deal_league_folds`."""
     descriptions = read_json(descriptions_path)
     joints = parse_robot(descriptions["robot"], descriptions["source"]).joints
     return DataSet(
@@ -99,48 +117,73 @@ def load_data_set(
 
 
 def deal_folds(
-    seen: Measurements, count: int, draws: np.random.Generator
+    measured: Measurements, count: int, draws: np.random.Generator
 ) -> dict[str, np.ndarray]:
-    """Columns (P,) of poses dealt into folds from 1, those of a configuration into one,
-    at random and by blocks of joint space.
+    """Deal P poses into folds from 1, at random and by blocks of joint space.
 
-    Random folds have neighbours among the poses fitted, so they ask how well a method
-    interpolates; blocks of joint space ask how well it extrapolates [1].
+    Poses of the same configuration belong to the same fold. Random folds have
+    neighbours among the training poses, so they test interpolation; blocks of joint
+    space test extrapolation [1]_.
 
-    [1] Roberts, D. R. et al., Cross-validation strategies for data with temporal, spatial, hierarchical, or phylogenetic
-        structure, Ecography 40, 2017.
+    Parameters
+    ----------
+    measured
+        All measurements.
+    count
+        Number of folds.
+    draws
+        Random numbers.
+
+    References
+    ----------
+    .. [1] Roberts, D. R. et al., Cross-validation strategies for data with temporal,
+       spatial, hierarchical, or phylogenetic structure, Ecography 40, 2017.
     """
-    pairs, index = list_poses(seen)
-    configuration = number_configurations(seen.joint_angles, index)
-    shuffled = draws.permutation(configuration.max() + 1)[configuration] % count + 1
-    blocks = partition_poses(seen.joint_angles, index, count) + 1
+    poses, index = list_poses(measured)
+    configuration = number_configurations(measured.joint_angles, index)
+    shuffled = draws.permutation(configuration.max() + 1)[configuration]
     return {
-        "session": pairs[:, 0],
-        "pose": pairs[:, 1],
-        RANDOM: shuffled,
-        BLOCKS: blocks,
+        "session": poses[:, 0],
+        "pose": poses[:, 1],
+        RANDOM: shuffled % count + 1,
+        BLOCKS: partition_poses(measured.joint_angles, index, count) + 1,
     }
 
 
 def split_rounds(
-    split: str, data: DataSet, others: Sequence[DataSet] = ()
+    split: str, data: DataSet, other_sessions: Sequence[DataSet] = ()
 ) -> Iterator[tuple[int, Case, list[Case]]]:
-    """Number, from 1, training poses, and held-out poses of each fold; of `SESSION`
-    these are the robot's other data sets."""
+    """Yield number, from 1, training poses, and held-out poses of each fold.
+
+    With `SESSION`, the only fold has all poses for training, and the held-out ones are
+    the robot's other data sets.
+    """
     if split == SESSION:
-        yield 1, data.case(), [other.case() for other in others]
+        yield 1, data.build_case(), [session.build_case() for session in other_sessions]
         return
-    fold = np.asarray(data.dealt[split])[
-        list_poses(build_measurements(data.columns))[1]
-    ]
+    pose = list_poses(build_measurements(data.columns))[1]
+    fold = np.asarray(data.folds[split])[pose]
     for number in np.unique(fold):
-        yield int(number), data.case(fold != number), [data.case(fold == number)]
+        held_out = data.build_case(fold == number)
+        yield int(number), data.build_case(fold != number), [held_out]
 
 
-def parse_method(described: Mapping[str, Any], name: str, source: str) -> Method:
-    """A method as a configuration describes it. Raises `InputError`: a regression that
-    the catalogue does not have."""
-    method = Method(**described)
+def parse_method(description: Mapping[str, Any], name: str, source: str) -> Method:
+    """Parse a method of a configuration.
+
+    Parameters
+    ----------
+    description
+        Fields of `Method`.
+    name, source
+        Name of the method, and of the configuration, for errors.
+
+    Raises
+    ------
+    InputError
+        If the catalogue has no such regression.
+    """
+    method = Method(**description)
     if method.regression is not None and method.regression not in REGRESSIONS:
         raise InputError(
             source,
@@ -152,7 +195,7 @@ def parse_method(described: Mapping[str, Any], name: str, source: str) -> Method
 
 
 def fit_physics(physics: str, case: Case) -> Fit:
-    """Fit frames, or what the campaign declares, to training poses."""
+    """Fit frames, or the declared model of the campaign, to training poses."""
     model = replace(case.model, effects=()) if physics == FRAMES else case.model
     return fit_declared_model(model, case.observations, estimate_noise(case)[0])
 
@@ -160,57 +203,64 @@ def fit_physics(physics: str, case: Case) -> Fit:
 def predict_held_out(
     method: Method, fitted: Fit, case: Case, held_out: Case, split: str, seed: int
 ) -> dict[str, np.ndarray]:
-    """Columns (M,) of what a method, fitted to the poses of a case, predicts of
-    held-out ones.
+    """Predict held-out poses by a method and tabulate its residuals.
 
-    A regression is tuned within the training poses by the same kind of split that
-    judges, see `residual_model.selection`; frames and targets of another campaign are fitted
-    to it, whatever the method. What a method does not state is not a number.
+    A regression is tuned within the training poses by a split of the same kind, see
+    `residual_model.selection`. Frames and targets of another campaign are fitted to it,
+    whatever the method.
+
+    Parameters
+    ----------
+    method, fitted
+        Method, and the fit of its physical model.
+    case, held_out
+        Training and held-out poses.
+    split, seed
+        Kind of the split, and seed of the regression.
+
+    Returns
+    -------
+    Columns (M,) of the entries table; standard deviations are NaN if the method states
+    none.
     """
-    seen = held_out.observations
+    observed = held_out.observations
     std = None
     if method.regression is None:
-        residual = compute_position_residuals(
-            *transfer_fit(fitted, case, held_out), seen
-        )
+        model, estimate = transfer_fit(fitted, case, held_out)
+        residual = compute_position_residuals(model, estimate, observed)
     else:
-        blocks = split != RANDOM
-        within_range = method.within_range
-        found = validate_residual_model(
+        prediction = validate_residual_model(
             fitted,
             case,
             held_out,
             method.regression,
-            blocks=blocks,
-            within_range=within_range,
+            blocks=split != RANDOM,
+            within_range=method.within_range,
             seed=seed,
         )
-        residual = found.residual
-        std = found.std
+        residual = prediction.residual
+        std = prediction.std
+    if std is None:
+        std = np.full_like(residual, np.nan)
     columns = {
-        name: getattr(seen.states, name)[seen.state]
+        name: getattr(observed.states, name)[observed.state]
         for name in ("session", "pose", "load")
     }
-    columns["target"] = seen.target
-    for head, values in (
-        ("d", residual),
-        ("std_", np.full_like(residual, np.nan) if std is None else std),
-    ):
-        columns |= {
-            f"{head}{axis}": values[:, number] for number, axis in enumerate("xyz")
-        }
+    columns["target"] = observed.target
+    for prefix, values in (("d", residual), ("std_", std)):
+        columns |= {f"{prefix}{axis}": values[:, k] for k, axis in enumerate("xyz")}
     return columns
 
 
 def tabulate_mechanisms(
     diagnosis: Diagnosis, fold: int
 ) -> dict[str, np.ndarray | list[str]]:
-    """Columns of the mechanisms table (K,) of one fold; none where the data are at
-    fault.
+    """Tabulate the K mechanisms that the diagnosis of a fold found.
 
-    The share of a mechanism is the sum of squares that it displaces the measurements
-    by, beyond what geometry and frames take up, over that of the residual which these
-    leave, in units of the noise. Mechanisms that resemble each other share it.
+    The share of a mechanism is the sum of squares of its contribution to the
+    measurements, beyond geometry and frames, divided by that of the residual of
+    geometry and frames, in units of the noise. Similar mechanisms share it. If the data
+    are at fault, there are no mechanisms.
     """
     mechanisms: Mapping[str, float] = {}
     shares: list[float] = []
@@ -218,92 +268,76 @@ def tabulate_mechanisms(
         mechanisms = evidence.conclusion.mechanisms
         best = evidence.conclusion.best
         problem = evidence.design.problem
-        explained = (
-            compute_explained_squares(problem, evidence.posterior.models[best.model])
-            if best.named
-            else {}
-        )
-        shares = [
-            explained.get(name, 0.0) / float(problem.statistics.residual_squares[0])
-            for name in mechanisms
-        ]
-    columns: dict[str, np.ndarray | list[str]] = {
+        explained: Mapping[str, float] = {}
+        if best.named:
+            best_model = evidence.posterior.models[best.model]
+            explained = compute_explained_squares(problem, best_model)
+        residual_squares = float(problem.statistics.residual_squares[0])
+        shares = [explained.get(name, 0.0) / residual_squares for name in mechanisms]
+    return {
         "fold": np.full(len(mechanisms), fold),
         "mechanism": [*mechanisms],
-    }
-    return columns | {
         "probability": np.array([*mechanisms.values()], float),
         "share": np.array(shares, float),
     }
 
 
 def deal_league_folds(job: Any) -> None:
-    """A data set of the league, checked, with its poses dealt into folds."""
+    """Check a data set of the benchmark and deal its poses into folds."""
     descriptions, campaign = read_described_campaign(
         read_campaign_folder(job.params.folder, job.params.robots)
     )
-    seen = campaign.measurements
+    measured = campaign.measurements
     origin = describe_provenance(job.params, **job.wildcards)
     draws = open_stream(job.params.seed, job.wildcards.data, "league folds", 0)
-    write_table(
-        job.output.measurements,
-        build_measurements_schema(seen.joint_angles.shape[1]),
-        [tabulate_measurements(seen)],
-        origin,
-    )
-    write_table(
-        job.output.folds, FOLDS, [deal_folds(seen, job.params.folds, draws)], origin
-    )
+    folds = deal_folds(measured, job.params.folds, draws)
+    schema = build_measurements_schema(measured.joint_angles.shape[1])
+    columns = tabulate_measurements(measured)
+    write_table(job.output.measurements, schema, [columns], origin)
+    write_table(job.output.folds, FOLDS, [folds], origin)
     write_json(job.output.descriptions, descriptions)
 
 
 def diagnose_league_folds(job: Any) -> None:
-    """What the training poses of each fold lack, by the whole diagnosis: its last step
-    and the mechanisms."""
+    """Diagnose the training poses of each fold; keep the last step and the
+    mechanisms."""
     data = load_data_set(
         job.input.descriptions, job.input.measurements, job.input.folds
     )
     facts = {}
     mechanisms = []
     for fold, training, _ in split_rounds(job.wildcards.split, data):
-        found = diagnose(training, Settings(), job.params.seed)
-        facts[str(fold)] = serialize_diagnosis(found)["steps"][-1]
-        mechanisms.append(tabulate_mechanisms(found, fold))
+        diagnosis = diagnose(training, Settings(), job.params.seed)
+        facts[str(fold)] = serialize_diagnosis(diagnosis)["steps"][-1]
+        mechanisms.append(tabulate_mechanisms(diagnosis, fold))
+    origin = describe_provenance(job.params, **job.wildcards)
     write_json(job.output.facts, facts)
-    write_table(
-        job.output.mechanisms,
-        MECHANISMS,
-        mechanisms,
-        describe_provenance(job.params, **job.wildcards),
-    )
+    write_table(job.output.mechanisms, MECHANISMS, mechanisms, origin)
 
 
 def enter_league(job: Any) -> None:
-    """What one method predicts of the poses of each fold, which it has not seen."""
+    """Predict the held-out poses of each fold by one method."""
     split = job.wildcards.split
     method = parse_method(job.params.method, job.wildcards.method, "config.yaml")
     steps = read_json(job.input.facts) if method.physics == DIAGNOSIS else {}
-    data, *others = map(
+    data, *other_sessions = map(
         load_data_set, job.input.descriptions, job.input.measurements, job.input.folds
     )
+    # Number 0 is the data set itself; the other sessions count from 1.
+    first_set = 1 if other_sessions else 0
     blocks = []
-    for fold, training, tests in split_rounds(split, data, others):
-        fitted = (
-            refit_step(training, steps[str(fold)])
-            if steps
-            else fit_physics(method.physics, training)
-        )
-        for number, held_out in enumerate(tests, 1 if others else 0):
+    for fold, training, tests in split_rounds(split, data, other_sessions):
+        if steps:
+            fitted = refit_step(training, steps[str(fold)])
+        else:
+            fitted = fit_physics(method.physics, training)
+        for number, held_out in enumerate(tests, first_set):
             columns = predict_held_out(
                 method, fitted, training, held_out, split, job.params.seed
             )
             count = len(columns["pose"])
-            blocks.append(
-                {"fold": np.full(count, fold), "set": np.full(count, number)} | columns
-            )
-    write_table(
-        job.output.entries,
-        ENTRIES,
-        blocks,
-        describe_provenance(job.params, **job.wildcards),
-    )
+            columns["fold"] = np.full(count, fold)
+            columns["set"] = np.full(count, number)
+            blocks.append(columns)
+    origin = describe_provenance(job.params, **job.wildcards)
+    write_table(job.output.entries, ENTRIES, blocks, origin)

@@ -1,4 +1,4 @@
-"""Every table that the league keeps, column by column."""
+"""Tables that the benchmark keeps, column by column."""
 
 from elastocal.io.storage import Column, TableSchema
 

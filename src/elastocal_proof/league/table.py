@@ -1,9 +1,9 @@
-"""The league as tables, with intervals, and as a page of text: errors of every method
-on poses that it has not seen."""
+"""Tabulate the errors of all methods of the benchmark on poses that they have not seen,
+with intervals, and write them as a page of text."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,129 +20,148 @@ from elastocal.validation.held_out import (
 )
 from elastocal_proof.league.methods import BLOCKS, DIAGNOSIS, RANDOM, SESSION, Method
 
-# A row of the league's table; and rows of the entries table by data set, split and
-# method.
+# A row of a table by the names of its columns.
 Row = Mapping[Any, Any]
+# Rows of the entries table by data set, split and method.
 Entries = Mapping[tuple[str, str, str], pd.DataFrame]
+# Number of bootstrap replicates of an interval.
 _REPLICATES = 1000
-_POSE = ["set", "session", "pose"]
 _TITLES = {
     RANDOM: "Random poses held out",
     BLOCKS: "Blocks of joint space held out",
     SESSION: "Fitted to one data set, tested on another session of the same robot",
 }
-_ERRORS = "RMS in mm with 95 % intervals over poses, then the maximum; the smallest RMS of each row in bold."
-_COVERED = "Share of coordinates inside the 95 % intervals that a method states."
-_FOUND = (
+_ERRORS_TITLE = (
+    "RMS in mm with 95 % intervals over poses, then the maximum; the smallest RMS of"
+    " each row in bold."
+)
+_COVERAGE_TITLE = "Share of coordinates inside the 95 % intervals that a method states."
+_MECHANISMS_TITLE = (
     "Mean over the folds of the random split, the least and the largest in brackets."
 )
-# Mechanisms that are less probable in every fold are not listed.
-_LEAST_PROBABLE = 0.05
+# A mechanism is listed if its probability exceeds this value in some fold.
+_MIN_PROBABILITY = 0.05
 
 
 def compare_methods(
     entries: Entries, robots: Mapping[str, Sequence[str]], reference: str, seed: int
 ) -> pd.DataFrame:
-    """One row for each data set, split and method, all of whose methods predict the
-    same poses.
+    """Compare the errors of all methods by data set and split.
 
-    `robots`: data sets by the names of their robots. RMS with 95 % limits by a
-    bootstrap over poses; ``ratio``: RMS over that of the reference, ``ratio_to_best``:
-    over the best of the row's data set and split; ``covered``: coordinates inside the
-    95 % intervals that the method states.
+    All methods of a data set and split predict the same poses.
+
+    Parameters
+    ----------
+    entries
+        Predictions of each method.
+    robots
+        Data sets by the names of their robots.
+    reference
+        Method to which the others are compared.
+    seed
+        Of the bootstrap.
+
+    Returns
+    -------
+    One row for each data set, split and method: RMS with 95 % limits by a bootstrap over
+    poses, and the maximum; ``ratio``: RMS divided by that of the reference;
+    ``ratio_to_best``: divided by the smallest of the same data set and split;
+    ``covered``: share of coordinates inside the 95 % intervals that the method states.
     """
     robot_of = {data: robot for robot, names in robots.items() for data in names}
-    rows: list[dict[str, Any]] = []
+    rows = []
     for data, split in dict.fromkeys(key[:2] for key in entries):
-        mine = {
-            method: part
-            for (name, way, method), part in entries.items()
-            if (name, way) == (data, split)
+        predictions = {
+            key[2]: table for key, table in entries.items() if key[:2] == (data, split)
         }
-        distances = [
-            np.linalg.norm(part[["dx", "dy", "dz"]].to_numpy(), axis=1)
-            for part in mine.values()
-        ]
-        poses = [group_equal_rows(part[_POSE].to_numpy())[1] for part in mine.values()]
-        errors = [PositionErrors(*each) for each in zip(distances, poses, strict=True)]
-        figures = [summarize_errors(error.distance) for error in errors]
-        rms = [each["rms_m"] for each in figures]
-        places = {
-            "ratio": list(mine).index(reference),
-            "ratio_to_best": int(np.argmin(rms)),
-        }
-        drawn = [
-            compute_error_intervals(
-                errors,
-                _REPLICATES,
-                open_stream(seed, data, f"league {split}", number),
-                place,
-            )
-            for number, place in enumerate(places.values())
-        ]
-        for number, (method, part) in enumerate(mine.items()):
-            low, high = drawn[0][0][number]["rms_m"]
-            row = {
-                "robot": robot_of[data],
-                "data": data,
-                "split": split,
-                "method": method,
-                "poses": errors[number].poses,
-            }
-            metres = {
-                "rms": rms[number],
-                "rms_low": low,
-                "rms_high": high,
-                "max": figures[number]["max_m"],
-            }
-            row |= {f"{name}_mm": 1e3 * value for name, value in metres.items()}
-            for (name, place), (_, reduction) in zip(
-                places.items(), drawn, strict=True
-            ):
-                ends = {
-                    f"{name}_low": 1.0 - reduction[number].high,
-                    f"{name}_high": 1.0 - reduction[number].low,
-                }
-                row |= {name: rms[number] / rms[place]} | ends
-            rows.append(row | {"covered": _covered(part)})
+        draws = [open_stream(seed, data, f"league {split}", k) for k in range(2)]
+        key = {"robot": robot_of[data], "data": data, "split": split}
+        rows += [key | row for row in _compare_round(predictions, reference, draws)]
     return pd.DataFrame(rows)
+
+
+def _compare_round(
+    predictions: Mapping[str, pd.DataFrame],
+    reference: str,
+    draws: Sequence[np.random.Generator],
+) -> Iterator[dict[str, Any]]:
+    """Compare methods on the same poses; `draws` are for the two ratios."""
+    errors = [_measure_errors(table) for table in predictions.values()]
+    summaries = [summarize_errors(error.distance) for error in errors]
+    rms = [summary["rms_m"] for summary in summaries]
+    references = {
+        "ratio": list(predictions).index(reference),
+        "ratio_to_best": int(np.argmin(rms)),
+    }
+    bootstraps = [
+        compute_error_intervals(errors, _REPLICATES, stream, index)
+        for stream, index in zip(draws, references.values(), strict=True)
+    ]
+    for number, (method, table) in enumerate(predictions.items()):
+        low_m, high_m = bootstraps[0][0][number]["rms_m"]
+        row = {
+            "method": method,
+            "poses": errors[number].poses,
+            "rms_mm": 1e3 * rms[number],
+            "rms_low_mm": 1e3 * low_m,
+            "rms_high_mm": 1e3 * high_m,
+            "max_mm": 1e3 * summaries[number]["max_m"],
+        }
+        for name, (_, reductions) in zip(references, bootstraps, strict=True):
+            row[name] = rms[number] / rms[references[name]]
+            row[f"{name}_low"] = 1.0 - reductions[number].high
+            row[f"{name}_high"] = 1.0 - reductions[number].low
+        yield row | {"covered": _compute_coverage(table)}
+
+
+def _measure_errors(entries: pd.DataFrame) -> PositionErrors:
+    distance = np.linalg.norm(entries[["dx", "dy", "dz"]].to_numpy(), axis=1)
+    poses = entries[["set", "session", "pose"]].to_numpy()
+    return PositionErrors(distance, group_equal_rows(poses)[1])
+
+
+def _compute_coverage(entries: pd.DataFrame) -> float:
+    """Share of coordinates inside the stated intervals; NaN if none are stated."""
+    std = entries[["std_x", "std_y", "std_z"]].to_numpy()
+    if not np.isfinite(std).all():
+        return float("nan")
+    error = np.abs(entries[["dx", "dy", "dz"]].to_numpy())
+    return float((error < NORMAL_QUANTILE * std).mean())
 
 
 def summarize_mechanisms(
-    found: Mapping[str, pd.DataFrame], robots: Mapping[str, Sequence[str]], folds: int
+    mechanisms: Mapping[str, pd.DataFrame],
+    robots: Mapping[str, Sequence[str]],
+    folds: int,
 ) -> pd.DataFrame:
-    """Mechanisms of each data set over the diagnoses of its folds: mean, least and
-    largest probability and share.
+    """Summarize the mechanisms that the diagnoses of all folds found in each data set.
 
-    `found`: rows of the mechanisms table of the random split, by data set. A fold that
-    does not list a mechanism counts as 0.
+    Parameters
+    ----------
+    mechanisms
+        Mechanisms table of the random split by data set.
+    robots
+        Data sets by the names of their robots.
+    folds
+        Number of folds. A fold that does not list a mechanism counts as zero.
+
+    Returns
+    -------
+    Mean, smallest and largest probability and share of each mechanism.
     """
     rows = []
-    for robot, data in (
-        (robot, data) for robot, names in robots.items() for data in names
-    ):
-        for mechanism, part in found[data].groupby("mechanism", sort=True):
+    robot_of = {data: robot for robot, names in robots.items() for data in names}
+    for data, robot in robot_of.items():
+        for mechanism, listed in mechanisms[data].groupby("mechanism", sort=True):
             row = {"robot": robot, "data": data, "mechanism": mechanism}
             for name in ("probability", "share"):
                 values = np.zeros(folds)
-                values[: len(part)] = part[name]
-                row |= {
-                    name: values.mean(),
-                    f"{name}_low": values.min(),
-                    f"{name}_high": values.max(),
-                }
+                values[: len(listed)] = listed[name]
+                row[name] = values.mean()
+                row[f"{name}_low"] = values.min()
+                row[f"{name}_high"] = values.max()
             rows.append(row)
     return pd.DataFrame(rows)
-
-
-def _covered(entries: pd.DataFrame) -> float:
-    off = np.abs(entries[["dx", "dy", "dz"]].to_numpy())
-    stated = entries[["std_x", "std_y", "std_z"]].to_numpy()
-    return (
-        float((off < NORMAL_QUANTILE * stated).mean())
-        if np.isfinite(stated).all()
-        else float("nan")
-    )
 
 
 def format_league_page(
@@ -151,148 +170,147 @@ def format_league_page(
     methods: Mapping[str, Method],
     missing: Mapping[str, str],
 ) -> str:
-    """Tables of the league as Markdown; `missing`: data sets that were left out, with
-    the file that each lacks."""
-    words = {name: method.words or name for name, method in methods.items()}
-    table = table.assign(
-        best=table.groupby(["data", "split"])["rms_mm"].transform("min")
-    )
+    """Format the tables of the benchmark as a Markdown page.
 
-    def error(each: Row) -> str:
-        rms, low, high, most = (
-            _shown(each[key], each["rms_mm"])
-            for key in ("rms_mm", "rms_low_mm", "rms_high_mm", "max_mm")
-        )
-        return f"{f'**{rms}**' if each['rms_mm'] == each['best'] else rms} ({low}–{high}), {most}"
-
-    parts = [
-        f"Left out: {_words(name)}, as {file} is missing."
+    Parameters
+    ----------
+    table, mechanisms
+        Tables of `compare_methods` and `summarize_mechanisms`.
+    methods
+        Methods by name.
+    missing
+        Data sets that were left out, and the file that each lacks.
+    """
+    labels = {name: method.words or name for name, method in methods.items()}
+    diagnosing = [name for name in methods if methods[name].physics == DIAGNOSIS]
+    best = table.groupby(["data", "split"])["rms_mm"].transform("min")
+    table = table.assign(best=best)
+    paragraphs = [
+        f"Left out: {_format_name(name)}, as {file} is missing."
         for name, file in missing.items()
     ]
-    parts.append(
-        _lead(
-            table,
-            {name for name, method in methods.items() if method.physics == DIAGNOSIS},
-        )
-    )
+    paragraphs.append(_describe_lead(table, diagnosing))
     for split, title in _TITLES.items():
-        mine = table[table["split"] == split]
-        if len(mine):
-            counts = (
-                mine.loc[mine.groupby("data")["rms_mm"].idxmin(), "method"]
-                .map(words)
-                .value_counts()
-            )
-            each = ", ".join(f"{name} {count}" for name, count in counts.items())
-            winners = f"Smallest RMS error of {format_count(int(counts.sum()), 'data set')}: {each}."
-            parts += [
-                f"## {title}",
-                winners,
-                format_collapsible(
-                    _ERRORS, _wide(mine, ["data", "poses"], words, error)
-                ),
-            ]
+        compared = table[table["split"] == split]
+        if compared.empty:
+            continue
+        best_rows = compared.groupby("data")["rms_mm"].idxmin()
+        counts = compared.loc[best_rows, "method"].map(labels).value_counts()
+        winners = ", ".join(f"{name} {count}" for name, count in counts.items())
+        sets = format_count(int(counts.sum()), "data set")
+        errors = _pivot_methods(compared, ["data", "poses"], labels, _format_errors)
+        paragraphs += [
+            f"## {title}",
+            f"Smallest RMS error of {sets}: {winners}.",
+            format_collapsible(_ERRORS_TITLE, errors),
+        ]
     stated = table.dropna(subset="covered")
-    # The middle of the coverages of each method, and their range.
     medians = [
-        f"{words[str(name)]} {100 * part.median():.0f} % (from {100 * part.min():.0f} to {100 * part.max():.0f})"
-        for name, part in stated.groupby("method", sort=False)["covered"]
+        f"{labels[str(name)]} {100 * shares.median():.0f} %"
+        f" (from {100 * shares.min():.0f} to {100 * shares.max():.0f})"
+        for name, shares in stated.groupby("method", sort=False)["covered"]
     ]
-    parts += [
+    coverage = _pivot_methods(
+        stated,
+        ["data", "split"],
+        labels,
+        lambda row: f"{100 * row['covered']:.1f} %",
+    )
+    paragraphs += [
         "## Intervals",
         f"Median over data sets and splits: {'; '.join(medians)}.",
+        format_collapsible(_COVERAGE_TITLE, coverage),
+        "## Mechanisms",
+        format_collapsible(_MECHANISMS_TITLE, _format_mechanisms(mechanisms)),
     ]
-    parts += [
-        format_collapsible(
-            _COVERED,
-            _wide(
-                stated,
-                ["data", "split"],
-                words,
-                lambda each: f"{100 * each['covered']:.1f} %",
-            ),
-        )
-    ]
-    parts += ["## Mechanisms", format_collapsible(_FOUND, _mechanisms(mechanisms))]
-    return "\n\n".join(parts) + "\n"
+    return "\n\n".join(paragraphs) + "\n"
 
 
 def format_collapsible(title: str, table: str) -> str:
-    """A table that a reader opens, under a title, as the Markdown of GitHub and of
-    MyST."""
+    """Format a table that the reader unfolds, for the Markdown of GitHub and MyST."""
     return f"<details><summary>{title}</summary>\n\n{table}\n\n</details>"
 
 
 def format_table(rows: list[dict[str, Any]]) -> str:
-    """A table of which each row has its cells by the heads of their columns."""
-    return (
-        pd.DataFrame(rows).fillna("").to_markdown(index=False, disable_numparse=True)
-        if rows
-        else "None."
-    )
+    """Format rows, by the heads of their columns, as a Markdown table."""
+    if not rows:
+        return "None."
+    cells = pd.DataFrame(rows).fillna("")
+    return cells.to_markdown(index=False, disable_numparse=True)
 
 
-def _wide(
+def _pivot_methods(
     table: pd.DataFrame,
     heads: list[str],
-    words: Mapping[str, str],
-    cell: Callable[[Row], str],
+    labels: Mapping[str, str],
+    format_cell: Callable[[Row], str],
 ) -> str:
-    """A row for each of `heads`, a column for each method."""
+    """Format a table with a row for each value of `heads` and a column for each
+    method."""
     rows: dict[tuple[Any, ...], dict[str, Any]] = {}
-    for each in table.to_dict("records"):
-        key = tuple(each[head] for head in heads)
-        named = {
-            head: _words(each[head]) if head == "data" else each[head] for head in heads
-        }
-        rows.setdefault(key, named)[words[each["method"]]] = cell(each)
+    for record in table.to_dict("records"):
+        key = tuple(record[head] for head in heads)
+        if key not in rows:
+            data = _format_name(record["data"])
+            rows[key] = dict(zip(heads, key, strict=True)) | {"data": data}
+        rows[key][labels[record["method"]]] = format_cell(record)
     return format_table([*rows.values()])
 
 
-def _lead(table: pd.DataFrame, ours: set[str]) -> str:
-    """In how many rows of all tables the best method rests on a diagnosis, and in how
-    many it does not."""
-    ahead: dict[bool, list[bool]] = {True: [], False: []}
-    for _, part in table.groupby(["split", "data"]):
-        diagnosed = part["method"].isin(ours).to_numpy()
-        wins = bool(diagnosed[part["rms_mm"].argmin()])
-        ahead[wins].append(
-            bool((part["ratio_to_best_low"][diagnosed != wins] > 1.0).all())
-        )
-    won = ahead[True]
-    lost = ahead[False]
+def _describe_lead(table: pd.DataFrame, diagnosing: list[str]) -> str:
+    """Count the rows of all tables whose best method uses a diagnosis, and the others;
+    and those in which it beats all methods of the other kind with confidence."""
+    # Whether the lead is certain, in each row that a method of this kind wins.
+    lead_is_certain: dict[bool, list[bool]] = {True: [], False: []}
+    for _, compared in table.groupby(["split", "data"]):
+        diagnosed = compared["method"].isin(diagnosing).to_numpy()
+        wins = bool(diagnosed[compared["rms_mm"].argmin()])
+        rival_ratios = compared["ratio_to_best_low"][diagnosed != wins]
+        lead_is_certain[wins].append(bool((rival_ratios > 1.0).all()))
+    won = lead_is_certain[True]
+    lost = lead_is_certain[False]
     return (
-        f"A method that diagnoses has the smallest RMS error in {len(won)} of {len(won) + len(lost)} rows, in {sum(won)} with"
-        f" 95 % confidence against each other method; another has it in {len(lost)}, in {sum(lost)} with that confidence."
+        f"A method that diagnoses has the smallest RMS error in {len(won)} of"
+        f" {len(won) + len(lost)} rows, in {sum(won)} with 95 % confidence against each"
+        f" other method; another has it in {len(lost)}, in {sum(lost)} with that"
+        " confidence."
     )
 
 
-def _mechanisms(table: pd.DataFrame) -> str:
-    shown = table[table["probability_high"] >= _LEAST_PROBABLE]
+def _format_mechanisms(table: pd.DataFrame) -> str:
     rows = []
-    for _, part in shown.groupby("data", sort=False):
-        for each in part.sort_values("share", ascending=False).to_dict("records"):
-            share, low, high = (
-                100 * each[key] for key in ("share", "share_low", "share_high")
-            )
-            row = {"data": _words(each["data"]), "mechanism": _words(each["mechanism"])}
-            row["probability"] = (
-                f"{each['probability']:.2f} ({each['probability_low']:.2f}–{each['probability_high']:.2f})"
-            )
+    probable = table[table["probability_high"] >= _MIN_PROBABILITY]
+    for _, listed in probable.groupby("data", sort=False):
+        for record in listed.sort_values("share", ascending=False).to_dict("records"):
             rows.append(
-                row
-                | {
-                    "share of the squared error": f"{share:.0f} % ({low:.0f}–{high:.0f})"
+                {
+                    "data": _format_name(record["data"]),
+                    "mechanism": _format_name(record["mechanism"]),
+                    "probability": f"{record['probability']:.2f}"
+                    f" ({record['probability_low']:.2f}–{record['probability_high']:.2f})",
+                    "share of the squared error": f"{100 * record['share']:.0f} %"
+                    f" ({100 * record['share_low']:.0f}–{100 * record['share_high']:.0f})",
                 }
             )
     return format_table(rows)
 
 
-def _words(name: str) -> str:
+def _format_name(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _shown(value: float, scale: float) -> str:
-    """A figure in mm with the decimals that show three significant digits of another,
-    at most four."""
-    return f"{value:.{int(np.clip(2 - np.floor(np.log10(scale)), 0, 4)) if scale > 0 else 3}f}"
+def _format_errors(row: Row) -> str:
+    """RMS with its interval and the maximum in mm; the best RMS is bold.
+
+    The decimals, four at most, show three significant digits of the RMS.
+    """
+    scale = row["rms_mm"]
+    decimals = 3
+    if scale > 0:
+        decimals = int(np.clip(2 - np.floor(np.log10(scale)), 0, 4))
+    rms, low, high, largest = (
+        f"{row[key]:.{decimals}f}"
+        for key in ("rms_mm", "rms_low_mm", "rms_high_mm", "max_mm")
+    )
+    bold = "**" if scale == row["best"] else ""
+    return f"{bold}{rms}{bold} ({low}–{high}), {largest}"

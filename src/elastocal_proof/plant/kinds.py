@@ -1,8 +1,8 @@
-"""Defects: all that can be wrong with a physical robot, named as in the catalogue, or
-``outside:...`` where it is not there.
+"""List the defects of a simulated robot: named as in the catalogue, or ``outside:...``
+if the catalogue does not have them.
 
 A defect has one size, which scales it, and a seed, from which its other details
-(directions, phases, thresholds) are drawn; they do not change with the size.
+(directions, phases, thresholds) are drawn. The details do not change with the size.
 """
 
 from __future__ import annotations
@@ -20,7 +20,10 @@ from elastocal_proof.plant.multibody import (
     find_distinguishable_weights,
     list_flexible_links,
 )
-from elastocal_proof.plant.simulated_robot import SimulatedRobot, open_simulation_stream
+from elastocal_proof.plant.simulated_robot import (
+    SimulatedRobot,
+    open_simulation_stream,
+)
 
 OUTSIDE = "outside:"
 Location = tuple[int, ...]
@@ -28,13 +31,24 @@ Location = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Kind:
-    """What all defects of one name have in common.
+    """Common properties of all defects of one name.
 
-    `unit`: of the size. `plausible`: a size such as real robots have. `locations`:
-    joints at which it can be on an arm, from 1. `apply`: of robot, size, draws of the
-    details, and joints from 0. `needs`: covariates without which the catalogue cannot
-    see it. `largest`: size beyond which the law means nothing. `scale`: powers of how
-    soft an arm is and of how large its loads are, with which the plausible size goes.
+    Attributes
+    ----------
+    unit
+        Of the size.
+    plausible
+        A size that is realistic for a heavy robot.
+    locations
+        Lists the locations on an arm: tuples of joints, from 1.
+    apply
+        Law of the defect: from robot, size, draws of the details, and joints from 0.
+    needs
+        Covariates without which the catalogue cannot see the defect.
+    largest
+        Size beyond which the law is meaningless.
+    scale
+        Exponents of the arm's softness and of its load share in the plausible size.
     """
 
     unit: str
@@ -46,34 +60,42 @@ class Kind:
     scale: tuple[float, float] = (0.0, 0.0)
 
     def scale_plausible_size(self, arm: Arm) -> float:
-        """A size such as this arm may have; `plausible` is a heavy one's."""
+        """Compute a size that is realistic for this arm."""
+        softness_exponent, load_exponent = self.scale
         return (
             self.plausible
-            * arm.softness ** self.scale[0]
-            * arm.load_share ** self.scale[1]
+            * arm.softness**softness_exponent
+            * arm.load_share**load_exponent
         )
 
 
 def _nowhere(arm: Arm) -> list[Location]:
+    """The only location of a defect that belongs to no joint."""
     return [()]
 
 
-def _joints(first: int, behind: int = 0) -> Callable[[Arm], list[Location]]:
-    """From one joint on, all that have so many behind them."""
+def _any_joint(arm: Arm) -> list[Location]:
+    return [(joint,) for joint in range(1, arm.joints + 1)]
+
+
+def _joints(first: int, behind: int) -> Callable[[Arm], list[Location]]:
+    """All joints from `first` on that have at least `behind` joints behind them."""
     return lambda arm: [(joint,) for joint in range(first, arm.joints + 1 - behind)]
 
 
 def _shoulder(arm: Arm) -> list[Location]:
-    """Where a gravity compensator can be, on arms that have one."""
+    """The joint of a gravity compensator, on arms that have one."""
     return [(2,)] if arm.compensated else []
 
 
+# Scale exponents: compliances grow with the softness of an arm, forces and masses with
+# its load.
 _SOFT = (1.0, 0.0)
 _LOAD = (0.0, 1.0)
 KINDS: dict[str, Kind] = {
-    "joint_offset": Kind("rad", 3e-4, _joints(1), laws.joint_offset),
-    "link_geometry": Kind("m", 3e-4, _joints(1), laws.link_geometry),
-    # A wrong wavelength, at which the frame of the base was measured too.
+    "joint_offset": Kind("rad", 3e-4, _any_joint, laws.joint_offset),
+    "link_geometry": Kind("m", 3e-4, _any_joint, laws.link_geometry),
+    # A wrong wavelength, with which the frame of the base was measured too.
     "tracker_scale": Kind(
         "1", 2e-5, _nowhere, partial(laws.set_instrument_error, "tracker", "scale")
     ),
@@ -87,15 +109,15 @@ KINDS: dict[str, Kind] = {
     "declared_masses": Kind("1", 0.3, _nowhere, laws.scale_declared_masses),
     "payload": Kind("kg", 25.0, _nowhere, laws.payload, scale=_LOAD),
     "compensator_torque": Kind("N/m", 1e5, _shoulder, laws.compensator_torque),
-    "transmission_harmonic": Kind("rad", 8e-5, _joints(1), laws.transmission_harmonic),
-    "transmission_ratio": Kind("rad/rad", 3e-4, _joints(1), laws.transmission_ratio),
-    "bearing_runout": Kind("m", 3e-5, _joints(1), laws.bearing_runout),
-    "motor_eccentricity": Kind("rad", 6e-5, _joints(1), laws.motor_eccentricity),
-    "transmission_order": Kind("rad", 8e-5, _joints(1), laws.transmission_order),
+    "transmission_harmonic": Kind("rad", 8e-5, _any_joint, laws.transmission_harmonic),
+    "transmission_ratio": Kind("rad/rad", 3e-4, _any_joint, laws.transmission_ratio),
+    "bearing_runout": Kind("m", 3e-5, _any_joint, laws.bearing_runout),
+    "motor_eccentricity": Kind("rad", 6e-5, _any_joint, laws.motor_eccentricity),
+    "transmission_order": Kind("rad", 8e-5, _any_joint, laws.transmission_order),
     "link_elasticity": Kind(
         "1/(N m^2)", 1e-7, list_flexible_links, laws.link_elasticity, scale=_SOFT
     ),
-    "joint_tilt": Kind("rad/(N m)", 2e-7, _joints(1), laws.joint_tilt, scale=_SOFT),
+    "joint_tilt": Kind("rad/(N m)", 2e-7, _any_joint, laws.joint_tilt, scale=_SOFT),
     "base_compliance": Kind(
         "rad/(N m)", 6e-8, _nowhere, laws.base_compliance, scale=_SOFT
     ),
@@ -109,7 +131,7 @@ KINDS: dict[str, Kind] = {
     "joint_dependent_stiffness": Kind(
         "1",
         0.1,
-        _joints(1),
+        _any_joint,
         partial(laws.modulate_stiffness, lambda joint: joint),
         largest=0.8,
     ),
@@ -117,9 +139,9 @@ KINDS: dict[str, Kind] = {
     "flange_flexibility": Kind(
         "rad/(N m)", 2e-7, _nowhere, laws.flange_flexibility, scale=_SOFT
     ),
-    "stiffening": Kind("1", 0.3, _joints(1), laws.stiffening, largest=0.95),
-    "lost_motion": Kind("rad", 7e-5, _joints(1), laws.lost_motion),
-    "hysteresis": Kind("rad", 5e-5, _joints(1), laws.hysteresis, needs=("approach",)),
+    "stiffening": Kind("1", 0.3, _any_joint, laws.stiffening, largest=0.95),
+    "lost_motion": Kind("rad", 7e-5, _any_joint, laws.lost_motion),
+    "hysteresis": Kind("rad", 5e-5, _any_joint, laws.hysteresis, needs=("approach",)),
     "force_scale": Kind(
         "1",
         0.02,
@@ -159,12 +181,12 @@ KINDS: dict[str, Kind] = {
         "rad/(N m)", 1e-7, _joints(2, 1), laws.cable_transmission, scale=_SOFT
     ),
     OUTSIDE + "asymmetric_gear": Kind(
-        "rad/(N m)^2", 1e-10, _joints(1), laws.asymmetric_gear, scale=(1.0, -1.0)
+        "rad/(N m)^2", 1e-10, _any_joint, laws.asymmetric_gear, scale=(1.0, -1.0)
     ),
-    OUTSIDE + "slipping_zero": Kind("rad", 5e-5, _joints(1), laws.slipping_zero),
-    OUTSIDE + "warm_softening": Kind("1/K", 0.01, _joints(1), laws.warm_softening),
+    OUTSIDE + "slipping_zero": Kind("rad", 5e-5, _any_joint, laws.slipping_zero),
+    OUTSIDE + "warm_softening": Kind("1/K", 0.01, _any_joint, laws.warm_softening),
     # A parallel rod: the stiffness of the shoulder depends on the angle of the elbow,
-    # or the other way round.
+    # or that of the elbow on the angle of the shoulder.
     OUTSIDE + "foreign_angle_stiffness": Kind(
         "1",
         0.15,
@@ -193,17 +215,24 @@ KINDS: dict[str, Kind] = {
         partial(laws.set_instrument_error, "cell", "crosstalk_per_N"),
         scale=(0.0, -1.0),
     ),
-    OUTSIDE + "short_waves": Kind("rad", 8e-5, _joints(1), laws.short_waves),
+    OUTSIDE + "short_waves": Kind("rad", 8e-5, _any_joint, laws.short_waves),
 }
 
 
 @dataclass(frozen=True)
 class Defect:
-    """One thing that is wrong with a robot.
+    """A defect of a robot.
 
-    `effect`: a key of `KINDS`. `joints`: from 1, one of its locations; empty where it
-    belongs to none. `size`: in the unit of its kind, up to its largest. `seed`: of its
-    details.
+    Attributes
+    ----------
+    effect
+        A key of `KINDS`.
+    joints
+        One of its locations, joints from 1; empty if it belongs to no joint.
+    size
+        In the unit of its kind, up to its largest size.
+    seed
+        Of its details.
     """
 
     effect: str
@@ -212,26 +241,24 @@ class Defect:
     seed: int = 0
 
     def on(self, robot: SimulatedRobot) -> laws.DefectiveRobot:
-        """The robot with it, and those of its parameters that are comparable."""
+        """Return the defective robot and the comparable parameters of the defect."""
         draws = open_simulation_stream(self.seed, f"details of {self.effect}")
-        return KINDS[self.effect].apply(
-            robot, self.size, draws, *(joint - 1 for joint in self.joints)
-        )
+        joints = (joint - 1 for joint in self.joints)
+        return KINDS[self.effect].apply(robot, self.size, draws, *joints)
 
 
 def apply_defects(
     robot: SimulatedRobot, defects: Iterable[Defect], times: float = 1.0
 ) -> SimulatedRobot:
-    """A robot with defects, one after another, each so many times as large."""
+    """Apply defects one after another, each multiplied by `times`."""
     for defect in defects:
         robot = replace(defect, size=times * defect.size).on(robot)[0]
     return robot
 
 
 def draw_defect(effect: str, arm: Arm, seed: int) -> Defect:
-    """A defect of plausible size at a location that is drawn."""
-    locations = KINDS[effect].locations(arm)
-    drawn = open_simulation_stream(seed, f"place of {effect}").integers(len(locations))
-    return Defect(
-        effect, locations[drawn], KINDS[effect].scale_plausible_size(arm), seed
-    )
+    """Draw the location of a defect of plausible size."""
+    kind = KINDS[effect]
+    locations = kind.locations(arm)
+    index = open_simulation_stream(seed, f"place of {effect}").integers(len(locations))
+    return Defect(effect, locations[index], kind.scale_plausible_size(arm), seed)

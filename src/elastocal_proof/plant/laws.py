@@ -1,9 +1,14 @@
-"""What defects do, those of the catalogue and others, as functions of robot, size,
-draws of details, and joints from 0.
+"""Apply defects to a simulated robot: those of the catalogue, and others.
 
-Laws are those of machines rather than of regressions: a dead band with edges, a
-stiffness that steps, a hysteresis with a history; none is the catalogue's formula where
-a machine would do otherwise. `kinds` names them and says where they can be.
+The functions of defects have the names of the catalogue's effects. Each takes the robot,
+the size of the defect, random draws of its details, and joints that count from 0. It
+returns the defective robot and those parameters, by the catalogue's names, that the
+catalogue's law of this effect has in common with the simulated one, exactly or to first
+order in the size.
+
+The laws are those of machines rather than of regressions: a dead band with edges, a
+stiffness that steps, a hysteresis with a history. A law has the formula of the catalogue
+only if a machine behaves like it. `kinds` lists the defects and says where they can be.
 """
 
 from __future__ import annotations
@@ -30,81 +35,83 @@ from elastocal_proof.plant.simulated_robot import (
 )
 
 Draws = np.random.Generator
-# The defective robot, and those parameters that the catalogue's law of this effect has
-# in common with what was done, by the catalogue's names; exactly or to first order in
-# the size.
 DefectiveRobot = tuple[SimulatedRobot, dict[str, float]]
+GearLaw = Callable[[Schedule, np.ndarray], np.ndarray]
 TURN = 2 * np.pi
-# Radius of a bearing, how thick a link is, and the reach of an arm on which a usual
-# load turns with its whole force.
-_BEARING_M = 0.15
-_LINK_M = 0.25
+# Radius of a bearing, and thickness of a link.
+_BEARING_RADIUS_M = 0.15
+_LINK_THICKNESS_M = 0.25
+# Torques on the gears of an arm: external loads on the main and the wrist joints of a
+# heavy arm, and the reach from which they act with their full lever.
+_MAIN_TORQUE_NM = 1500.0
+_WRIST_TORQUE_NM = 450.0
 _HEAVY_REACH_M = 2.5
-# In the first half of the training poses, with repeats and without, at a state in 25 s.
-_KNOCKED_S = (700.0, 2000.0)
-_HISTORY_STEPS = 48
+# Range of the time at which the tracker is knocked: in the first half of the training
+# poses, with repeats and without, if a state takes 25 s.
+_KNOCK_TIMES_S = (700.0, 2000.0)
+# Number of steps of the integration of the Bouc-Wen model.
+_HYSTERESIS_STEPS = 48
 _RIGID = TaperedTube(np.inf, np.inf)
 
 
 def add_laws(
     robot: SimulatedRobot, part: str, *laws: tuple[int | str, Callable[..., Any]]
 ) -> SimulatedRobot:
-    """With further laws of "drives", "gears" or "springs"."""
+    """Add laws to the robot's "drives", "gears" or "springs"."""
     changes: dict[str, Any] = {part: (*getattr(robot, part), *laws)}
     return replace(robot, **changes)
 
 
 def change_part(robot: SimulatedRobot, part: str, **changes: Any) -> SimulatedRobot:
-    """With another "structure", "tracker" or "cell"."""
+    """Change fields of the robot's "structure", "tracker" or "cell"."""
     return replace(robot, **{part: replace(getattr(robot, part), **changes)})
 
 
-def add_gear_law(
-    robot: SimulatedRobot, joint: int, law: Callable[[Schedule, np.ndarray], np.ndarray]
-) -> SimulatedRobot:
-    """With a law of the torque on this joint alone."""
+def add_gear_law(robot: SimulatedRobot, joint: int, law: GearLaw) -> SimulatedRobot:
+    """Add a deflection of a gear that depends on the torque of its own joint only."""
     return add_laws(
-        robot, "gears", (joint, lambda done, torque, _: law(done, torque[:, joint]))
+        robot,
+        "gears",
+        (joint, lambda schedule, torque, _: law(schedule, torque[:, joint])),
     )
 
 
 def add_drive_law(
     robot: SimulatedRobot, joint: int, law: Callable[[np.ndarray], np.ndarray]
 ) -> SimulatedRobot:
-    """With an error of this joint's drive by the angles of all joints."""
-    return add_laws(robot, "drives", (joint, lambda done: law(done.angle)))
+    """Add an error of a drive that depends on the angles of all joints."""
+    return add_laws(robot, "drives", (joint, lambda schedule: law(schedule.angle)))
 
 
 def draw_direction(draws: Draws) -> np.ndarray:
+    """Draw a unit vector."""
     vector = draws.standard_normal(3)
     return vector / np.linalg.norm(vector)
 
 
 def name_components(
-    start: str, vector: Iterable[float], axes: Iterable[str] = "xyz"
+    prefix: str, vector: Iterable[float], axes: Iterable[str] = "xyz"
 ) -> dict[str, float]:
-    return {f"{start}{axis}": value for axis, value in zip(axes, vector, strict=True)}
+    """Name the components of a vector by their axes."""
+    return {f"{prefix}{axis}": value for axis, value in zip(axes, vector, strict=True)}
 
 
 def draw_sign(draws: Draws) -> float:
+    """Draw -1 or 1."""
     return float(draws.choice([-1.0, 1.0]))
 
 
 def compute_typical_torque_Nm(robot: SimulatedRobot, joint: int) -> float:  # noqa: N802 - units in names keep their case
-    """Torque on a joint as its gear is made for: that of the weight it carries, and of
-    a kilonewton at a heavy arm."""
+    """Compute the torque for which the gear of a joint is made: that of the weight that
+    it carries, and of one kilonewton on a heavy arm."""
     arm = robot.arm
     structure = robot.structure
-    load = (
-        (1500.0 if joint < arm.joints - 3 else 450.0)
-        * arm.load_share
-        * min(1.0, arm.reach_m / _HEAVY_REACH_M)
+    heavy_torque = _MAIN_TORQUE_NM if joint < arm.joints - 3 else _WRIST_TORQUE_NM
+    lever_share = min(1.0, arm.reach_m / _HEAVY_REACH_M)
+    gravity_torque = compute_typical_gravity_torque(
+        arm, structure.masses, structure.gravity_m_s2
     )
-    return load + float(
-        compute_typical_gravity_torque(arm, structure.masses, structure.gravity_m_s2)[
-            joint
-        ]
-    )
+    return heavy_torque * arm.load_share * lever_share + float(gravity_torque[joint])
 
 
 # Geometry and weight
@@ -113,6 +120,7 @@ def compute_typical_torque_Nm(robot: SimulatedRobot, joint: int) -> float:  # no
 def joint_offset(
     robot: SimulatedRobot, size: float, draws: Draws, joint: int
 ) -> DefectiveRobot:
+    """A constant error of the joint's zero."""
     size = size * draw_sign(draws)
     return add_laws(robot, "drives", (joint, lambda _: size)), {"offset": size}
 
@@ -120,66 +128,59 @@ def joint_offset(
 def link_geometry(
     robot: SimulatedRobot, size: float, draws: Draws, joint: int
 ) -> DefectiveRobot:
-    """A wrong vector, and a wrong turn of as many milliradians as it has
-    millimetres."""
+    """A wrong vector of a link, and a rotation of as many milliradians as the vector
+    has millimetres."""
     vector = size * draw_direction(draws)
     turn = size * draw_direction(draws)
     link = joint + 1
+    errors = robot.structure.geometry_errors | {link: (vector, turn)}
     # The catalogue counts along the axes at the far end of the link.
-    parameters = name_components(
-        "d", robot.arm.links[link].rotation.T @ vector
-    ) | name_components("r", turn)
-    return change_part(
-        robot,
-        "structure",
-        geometry_errors=robot.structure.geometry_errors | {link: (vector, turn)},
-    ), parameters
+    shift = robot.arm.links[link].rotation.T @ vector
+    parameters = name_components("d", shift) | name_components("r", turn)
+    return change_part(robot, "structure", geometry_errors=errors), parameters
 
 
 def link_weight(
     robot: SimulatedRobot, size: float, draws: Draws, *joints: int
 ) -> DefectiveRobot:
-    """Weight of the upper arm or the forearm, beside its line, or of all links as
-    declared, by the joints that it turns."""
-    link = find_distinguishable_weights(robot.arm).get(
-        tuple(joint + 1 for joint in joints)
-    )
-    if link is not None:
-        along = draws.uniform(0.25, 0.6)
-        aside = draws.uniform(-0.06, 0.06, 3)
-        heavy = LinkMass(
-            link,
-            size,
-            tuple(along * robot.arm.links[link].vector_m + aside),
-            along=along,
+    """An additional mass: of the upper arm or the forearm, beside its line; or of all
+    links in proportion to the declared ones. The joints that it loads say which."""
+    loaded = tuple(joint + 1 for joint in joints)
+    link = find_distinguishable_weights(robot.arm).get(loaded)
+    if link is None:
+        declared_kg = sum(
+            {
+                mass.link: mass.mass_kg for mass in robot.arm.masses if mass.link > 1
+            }.values()
         )
-        return change_part(
-            robot, "structure", masses=(*robot.structure.masses, heavy)
-        ), {}
-    kilograms = {mass.link: mass.mass_kg for mass in robot.arm.masses if mass.link > 1}
-    return scale_declared_masses(robot, size / sum(kilograms.values()), draws, 2)[0], {}
+        return scale_declared_masses(robot, size / declared_kg, draws, 2)[0], {}
+    along = draws.uniform(0.25, 0.6)
+    aside = draws.uniform(-0.06, 0.06, 3)
+    centre = along * robot.arm.links[link].vector_m + aside
+    mass = LinkMass(link, size, tuple(centre), along=along)
+    masses = (*robot.structure.masses, mass)
+    return change_part(robot, "structure", masses=masses), {}
 
 
 def scale_declared_masses(
     robot: SimulatedRobot, size: float, draws: Draws, first_link: int = 1
 ) -> DefectiveRobot:
-    """All links behind the column heavier by one share than the robot file says."""
-    more = [
+    """All links behind the column are heavier by the same share than declared."""
+    excess = [
         replace(mass, mass_kg=size * mass.mass_kg)
         for mass in robot.arm.masses
         if mass.link >= first_link
     ]
-    return change_part(robot, "structure", masses=(*robot.structure.masses, *more)), {
-        "share": size
-    }
+    masses = (*robot.structure.masses, *excess)
+    return change_part(robot, "structure", masses=masses), {"share": size}
 
 
 def payload(robot: SimulatedRobot, size: float, draws: Draws) -> DefectiveRobot:
+    """An undeclared tool at the flange."""
     centre = 0.15 * draw_direction(draws)
-    heavier = change_part(
-        robot, "structure", payload=LinkMass(robot.arm.joints, size, tuple(centre))
-    )
-    return heavier, {"mass": size} | name_components("moment_", size * centre)
+    mass = LinkMass(robot.arm.joints, size, tuple(centre))
+    parameters = {"mass": size} | name_components("moment_", size * centre)
+    return change_part(robot, "structure", payload=mass), parameters
 
 
 def compensator_torque(
@@ -188,9 +189,8 @@ def compensator_torque(
     """A coil spring whose pull the controller does not know."""
     anchor = (-draws.uniform(0.25, 0.4), 0.0, -draws.uniform(0.1, 0.3))
     crank = (draws.uniform(0.12, 0.22), 0.0, draws.uniform(-0.08, 0.08))
-    return change_part(
-        robot, "structure", compensator=(anchor, crank, size, draws.uniform(0.2, 0.35))
-    ), {}
+    compensator = (anchor, crank, size, draws.uniform(0.2, 0.35))
+    return change_part(robot, "structure", compensator=compensator), {}
 
 
 # Transmission
@@ -200,158 +200,136 @@ def add_sinusoids(
     robot: SimulatedRobot,
     joint: int,
     orders: ArrayLike,
-    sizes: ArrayLike,
+    amplitudes: ArrayLike,
     phases: np.ndarray,
 ) -> DefectiveRobot:
-    """Teeth and eccentric wheels: the sum of sizes sin(orders q + phases); orders need
-    not be whole."""
-    return add_drive_law(
-        robot,
-        joint,
-        lambda q: (
-            np.sin(np.outer(q[:, joint], np.array(orders)) + phases) @ np.array(sizes)
-        ),
-    ), {}
+    """Add errors of teeth and eccentric wheels: the sum of amplitudes sin(orders q +
+    phases). Orders need not be integers."""
+
+    def wave(angles: np.ndarray) -> np.ndarray:
+        sinusoids = np.sin(np.outer(angles[:, joint], np.array(orders)) + phases)
+        return sinusoids @ np.array(amplitudes)
+
+    return add_drive_law(robot, joint, wave), {}
 
 
 def transmission_harmonic(
     robot: SimulatedRobot, size: float, draws: Draws, joint: int
 ) -> DefectiveRobot:
-    """An eccentric wheel that turns with the joint: an order of 1 or 2 but for creep,
-    and half as much of its double."""
+    """An eccentric wheel that turns with the joint: order 1 or 2 apart from creep, and
+    half the amplitude at its double or half."""
     order = draws.choice([1, 2]) * draws.uniform(0.98, 1.02)
+    second_order = 2 * order if order < 1.5 else order / 2
     phases = draws.uniform(0, TURN, 2)
     return add_sinusoids(
-        robot,
-        joint,
-        (order, 2 * order if order < 1.5 else order / 2),
-        (size, 0.5 * size),
-        phases,
+        robot, joint, (order, second_order), (size, 0.5 * size), phases
     )
 
 
 def motor_eccentricity(
     robot: SimulatedRobot, size: float, draws: Draws, joint: int
 ) -> DefectiveRobot:
-    """A wheel on the motor's shaft: once and twice a turn of the motor, which is no
-    whole number of turns of the joint."""
+    """A wheel on the motor's shaft: once and twice per turn of the motor, whose ratio to
+    the joint is no integer."""
     order = robot.arm.gear_ratio[joint]
-    return add_sinusoids(
-        robot,
-        joint,
-        (order, 2.0 * order),
-        (size, 0.4 * size),
-        draws.uniform(0, TURN, 2),
-    )
+    phases = draws.uniform(0, TURN, 2)
+    return add_sinusoids(robot, joint, (order, 2.0 * order), (size, 0.4 * size), phases)
 
 
 def transmission_order(
     robot: SimulatedRobot, size: float, draws: Draws, joint: int
 ) -> DefectiveRobot:
-    """A planet or a cage: an order between two integers, and a quarter as much of its
-    double; some twenty poses can show it."""
+    """A planet or a cage: an order between two integers, and a quarter of the amplitude
+    at its double. Some twenty poses can resolve it."""
     order = draws.integers(2, 5) + draws.uniform(0.25, 0.75)
+    phases = draws.uniform(0, TURN, 2)
     return add_sinusoids(
-        robot,
-        joint,
-        (order, 2.0 * order),
-        (size, 0.25 * size),
-        draws.uniform(0, TURN, 2),
+        robot, joint, (order, 2.0 * order), (size, 0.25 * size), phases
     )
 
 
 def short_waves(
     robot: SimulatedRobot, size: float, draws: Draws, joint: int
 ) -> DefectiveRobot:
-    """Teeth of a motor's pinion: of orders far above what the poses of a campaign can
+    """Teeth of a motor's pinion, of orders far above those that a campaign's poses can
     resolve."""
-    return add_sinusoids(
-        robot,
-        joint,
-        draws.uniform(45.0, 120.0, 3),
-        [size / np.sqrt(3)] * 3,
-        draws.uniform(0, 6.28, 3),
-    )
+    orders = draws.uniform(45.0, 120.0, 3)
+    phases = draws.uniform(0, 6.28, 3)
+    return add_sinusoids(robot, joint, orders, [size / np.sqrt(3)] * 3, phases)
 
 
 def transmission_ratio(
     robot: SimulatedRobot, size: float, draws: Draws, joint: int
 ) -> DefectiveRobot:
-    """Of the joint's own ratio, or what the joint before it turns along."""
-    of = joint if joint == 0 else joint - int(draws.integers(2))
+    """A wrong ratio of the joint, or a coupling to the joint before it."""
+    source = joint if joint == 0 else joint - int(draws.integers(2))
     size = size * draw_sign(draws)
-    return add_drive_law(robot, joint, lambda q: size * q[:, of]), {
-        f"per_q{of + 1}": size
-    }
+    law = add_drive_law(robot, joint, lambda angles: size * angles[:, source])
+    return law, {f"per_q{source + 1}": size}
 
 
 def bearing_runout(
     robot: SimulatedRobot, size: float, draws: Draws, joint: int
 ) -> DefectiveRobot:
-    """The axis of a joint moves to and fro once a turn across it and twice across both:
-    circling, it would be another link."""
+    """The joint's axis shifts and tilts to and fro, once a turn in one direction across
+    it and twice in the other. If it circled, this would be another link."""
     phases = draws.uniform(0, TURN, (2, 2))
     number = joint + 1
-    bearings = robot.structure.bearings
 
-    def runout(
-        order: int, size: float, phase: float
-    ) -> Callable[[Schedule, np.ndarray], np.ndarray]:
-        return lambda done, _: size * np.cos(order * done.angle[:, joint] - phase)
-
-    laws = [
-        (f"{motion}{number}_{which}", runout(which + 1, largest, phases[place, which]))
-        for place, (motion, largest) in enumerate(
-            (("shift", size), ("tilt", size / _BEARING_M))
+    def runout(order: int, amplitude: float, phase: float) -> GearLaw:
+        return lambda schedule, _: (
+            amplitude * np.cos(order * schedule.angle[:, joint] - phase)
         )
-        for which in range(2)
-    ]
-    return add_laws(
-        change_part(robot, "structure", bearings={number: (0.0, 0.0)} | bearings),
-        "springs",
-        *laws,
-    ), {}
+
+    laws = []
+    for k in range(2):
+        shift = runout(k + 1, size, phases[0, k])
+        tilt = runout(k + 1, size / _BEARING_RADIUS_M, phases[1, k])
+        laws += [(f"shift{number}_{k}", shift), (f"tilt{number}_{k}", tilt)]
+    bearings = {number: (0.0, 0.0)} | robot.structure.bearings
+    robot = change_part(robot, "structure", bearings=bearings)
+    return add_laws(robot, "springs", *laws), {}
 
 
 def cable_pull(
     robot: SimulatedRobot, size: float, draws: Draws, joint: int
 ) -> DefectiveRobot:
-    """A hose wound by its joint and the one before pulls in proportion to the product
-    of the two angles."""
+    """A hose wound by its joint and the one before, which pulls in proportion to the
+    product of the two angles."""
     size = size * draw_sign(draws)
     return add_drive_law(
-        robot, joint, lambda q: size * q[:, joint - 1] * q[:, joint]
+        robot, joint, lambda angles: size * angles[:, joint - 1] * angles[:, joint]
     ), {}
 
 
 def two_angles(
     robot: SimulatedRobot, size: float, draws: Draws, joint: int
 ) -> DefectiveRobot:
-    """A gear whose wave goes once round as its own joint and the one behind it turn, in
-    step or against each other."""
+    """A gear whose wave depends on the sum or the difference of its own angle and the
+    next one."""
     sense = draw_sign(draws)
     phase = draws.uniform(0, TURN)
     return add_drive_law(
         robot,
         joint,
-        lambda q: size * np.sin(q[:, joint] + sense * q[:, joint + 1] + phase),
+        lambda angles: (
+            size * np.sin(angles[:, joint] + sense * angles[:, joint + 1] + phase)
+        ),
     ), {}
 
 
 def slipping_zero(
     robot: SimulatedRobot, size: float, draws: Draws, joint: int
 ) -> DefectiveRobot:
-    """A coupling that slips a little at three of ten moves: a random walk from approach
-    to approach, numbered in time."""
+    """A coupling that slips a little at three of ten moves: a random walk over the
+    approaches in order of time."""
 
-    def walk(done: Schedule) -> np.ndarray:
-        sizes, whether = (
-            np.random.default_rng([done.seed, 7, part]) for part in range(2)
-        )
-        number = int(done.approach.max()) + 1
-        return np.cumsum(
-            size * sizes.standard_normal(number) * (whether.random(number) < 0.3)
-        )[done.approach]
+    def walk(schedule: Schedule) -> np.ndarray:
+        size_draws = np.random.default_rng([schedule.seed, 7, 0])
+        slip_draws = np.random.default_rng([schedule.seed, 7, 1])
+        moves = int(schedule.approach.max()) + 1
+        steps = size * size_draws.standard_normal(moves)
+        return np.cumsum(steps * (slip_draws.random(moves) < 0.3))[schedule.approach]
 
     return add_laws(robot, "drives", (joint, walk)), {}
 
@@ -362,163 +340,137 @@ def slipping_zero(
 def link_elasticity(
     robot: SimulatedRobot, size: float, draws: Draws, joint: int
 ) -> DefectiveRobot:
-    """A tapered tube that also shears and stretches, as a thin-walled one of a quarter
-    metre does."""
+    """A tapered tube that also shears and stretches, like a thin-walled one of a
+    quarter metre in diameter."""
     bending = 1.0 / size
+    # Of a thin-walled tube of diameter d the squared radius of gyration is d^2 / 8.
     gyration = 0.25**2 / 8.0
     axial = bending / gyration
-    tube = TaperedTube(
-        bending, 0.77 * bending, axial, 0.5 * axial / 2.6, draws.uniform(0.1, 0.35)
-    )
-    return change_part(
-        robot, "structure", tubes=robot.structure.tubes | {joint + 1: tube}
-    ), {}
+    taper = draws.uniform(0.1, 0.35)
+    tube = TaperedTube(bending, 0.77 * bending, axial, 0.5 * axial / 2.6, taper)
+    tubes = robot.structure.tubes | {joint + 1: tube}
+    return change_part(robot, "structure", tubes=tubes), {}
 
 
 def stiffening_link(
     robot: SimulatedRobot, size: float, draws: Draws, joint: int
 ) -> DefectiveRobot:
-    """A bolted link whose flanges open with the cube of the bending moment; without it
-    the link is rigid."""
-    rigid = change_part(
-        robot, "structure", tubes=robot.structure.tubes | {joint + 1: _RIGID}
-    )
-    return add_laws(
-        rigid,
-        "springs",
-        (f"link{joint + 1}_bend", lambda _, moment: size * moment**3 / SEGMENTS),
-    ), {}
+    """A bolted link whose flanges open with the cube of the bending moment; without the
+    defect the link is rigid."""
+    tubes = robot.structure.tubes | {joint + 1: _RIGID}
+    robot = change_part(robot, "structure", tubes=tubes)
+    law = (f"link{joint + 1}_bend", lambda _, moment: size * moment**3 / SEGMENTS)
+    return add_laws(robot, "springs", law), {}
 
 
 def joint_tilt(
     robot: SimulatedRobot, size: float, draws: Draws, joint: int
 ) -> DefectiveRobot:
-    values = size * draws.uniform(0.4, 1.0, 2)
-    across = [
-        axis
-        for axis, part in zip("xyz", robot.arm.axes[joint], strict=True)
-        if abs(part) < 0.5
-    ]
-    bearings = robot.structure.bearings | {joint + 1: tuple(values)}
-    return change_part(robot, "structure", bearings=bearings), name_components(
-        "tilt_about_", values, across
-    )
+    """A bearing that tilts under moments across the joint's axis."""
+    compliances = size * draws.uniform(0.4, 1.0, 2)
+    across = np.flatnonzero(np.abs(robot.arm.axes[joint]) < 0.5)
+    bearings = robot.structure.bearings | {joint + 1: tuple(compliances)}
+    parameters = name_components("tilt_about_", compliances, ("xyz"[k] for k in across))
+    return change_part(robot, "structure", bearings=bearings), parameters
 
 
 def base_compliance(robot: SimulatedRobot, size: float, draws: Draws) -> DefectiveRobot:
-    """Anchor bolts: the two tilts and the two shifts differ a little."""
+    """Anchor bolts: the two tilts and the two horizontal shifts differ a little."""
     uneven = draws.uniform(0.85, 1.15, 4)
     horizontal = 0.2 * size
     vertical = 0.1 * size
-    base = (
-        horizontal * uneven[0],
-        horizontal * uneven[1],
-        vertical,
-        size * uneven[2],
-        size * uneven[3],
-        0.0,
-    )
+    base = (*(horizontal * uneven[:2]), vertical, *(size * uneven[2:]), 0.0)
     return change_part(robot, "structure", base=base), {"vertical": vertical}
 
 
 def foot_slip(robot: SimulatedRobot, size: float, draws: Draws) -> DefectiveRobot:
-    """A foot between its bolts: it shifts by a clearance as soon as the push exceeds
-    friction, and no further."""
+    """A foot with clearance at its bolts: once the push exceeds friction, it shifts by
+    the clearance and no further."""
     friction = draws.uniform(100.0, 300.0) * robot.arm.load_share
 
     def slip(_: Schedule, push: np.ndarray) -> np.ndarray:
-        return (
-            size
-            * np.sign(push)
-            * np.clip((np.abs(push) - friction) / friction, 0.0, 1.0)
-        )
+        share = np.clip((np.abs(push) - friction) / friction, 0.0, 1.0)
+        return size * np.sign(push) * share
 
-    return add_laws(
-        change_part(robot, "structure", base=(0.0,) * 6),
-        "springs",
-        ("base_x", slip),
-        ("base_y", slip),
-    ), {}
+    robot = change_part(robot, "structure", base=(0.0,) * 6)
+    return add_laws(robot, "springs", ("base_x", slip), ("base_y", slip)), {}
 
 
 def flange_flexibility(
     robot: SimulatedRobot, size: float, draws: Draws
 ) -> DefectiveRobot:
-    """A tool changer between flange and target: it turns in three directions, and
-    shifts by a tenth of a metre's lever."""
+    """A tool changer between flange and target, which turns about three axes and
+    shifts by a lever of a tenth of a metre."""
     turns = size * draws.uniform(0.4, 1.0, 3)
     shifts = 0.01 * size * draws.uniform(0.4, 1.0, 3)
-    flange = np.array(robot.structure.flange or (0.0,) * 6) + np.concatenate(
-        [shifts, turns]
-    )
-    return change_part(robot, "structure", flange=tuple(flange)), name_components(
-        "shift_", shifts
-    ) | name_components("turn_", turns)
+    flange = np.array(robot.structure.flange or (0.0,) * 6)
+    flange = flange + np.concatenate([shifts, turns])
+    parameters = name_components("shift_", shifts) | name_components("turn_", turns)
+    return change_part(robot, "structure", flange=tuple(flange)), parameters
 
 
 # Gears under torque
 
 
 def cross_compliance(
-    robot: SimulatedRobot, size: float, draws: Draws, one: int, other: int
+    robot: SimulatedRobot, size: float, draws: Draws, first: int, second: int
 ) -> DefectiveRobot:
     """Two gears in one housing: theta_i = c tau_j, theta_j = c tau_i."""
     size = size * draw_sign(draws)
-    coupled = (
-        (one, lambda _, torque, __: size * torque[:, other]),
-        (other, lambda _, torque, __: size * torque[:, one]),
+    laws = (
+        (first, lambda _, torque, __: size * torque[:, second]),
+        (second, lambda _, torque, __: size * torque[:, first]),
     )
-    return add_laws(robot, "gears", *coupled), {"compliance": size}
+    return add_laws(robot, "gears", *laws), {"compliance": size}
 
 
 def modulate_stiffness(
-    of: Callable[[int], int],
+    get_source: Callable[[int], int],
     robot: SimulatedRobot,
     size: float,
     draws: Draws,
     joint: int,
 ) -> DefectiveRobot:
-    """The stiffness, not the compliance, is a cosine of an angle: theta = c (1 / (1 + e
-    cos(q_of - phase)) - 1) tau."""
-    c = robot.compliance[joint]
-    other = of(joint)
+    """The stiffness, not the compliance, is a cosine of the angle of a source joint:
+    theta = c (1 / (1 + e cos(q_source - phase)) - 1) tau."""
+    compliance = robot.compliance[joint]
+    source = get_source(joint)
     phase = draws.uniform(0, TURN)
-    return add_gear_law(
-        robot,
-        joint,
-        lambda done, tau: (
-            c * (1 / (1 + size * np.cos(done.angle[:, other] - phase)) - 1) * tau
-        ),
-    ), {}
+
+    def turn(schedule: Schedule, torque: np.ndarray) -> np.ndarray:
+        stiffness_ratio = 1 + size * np.cos(schedule.angle[:, source] - phase)
+        return compliance * (1 / stiffness_ratio - 1) * torque
+
+    return add_gear_law(robot, joint, turn), {}
 
 
 def compensator_stiffness(
     robot: SimulatedRobot, size: float, draws: Draws, joint: int
 ) -> DefectiveRobot:
-    """Stiffness that a coil spring adds at the shoulder, whose torque the controller
-    has taken care of.
+    """Stiffness that a coil spring adds at the shoulder; the controller compensates its
+    torque.
 
-    With anchor at distance a, crank at L and free length s0, s^2 = a^2 + L^2 - 2 a L
-    cos(u), u = q - u0, the spring stores k (s - s0)^2 / 2, whose second derivative is
-    k_c = k a L [cos u (1 - s0/s) + (a L sin^2 u) s0 / s^3]. theta = (1 / (1/c + k_c) -
-    c) tau.
+    Let the anchor be at distance a, the crank at L, the free length s0, u = q - u0 and
+    s^2 = a^2 + L^2 - 2 a L cos(u). The spring stores k (s - s0)^2 / 2, whose second
+    derivative is k_c = k a L [cos u (1 - s0/s) + (a L sin^2 u) s0 / s^3]. The gear
+    yields theta = (1 / (1/c + k_c) - c) tau.
     """
     anchor = draws.uniform(0.3, 0.5)
     crank = draws.uniform(0.15, 0.22)
-    free = draws.uniform(0.15, 0.3)
+    free_length = draws.uniform(0.15, 0.3)
     zero = draws.uniform(-np.pi, np.pi)
     compliance = robot.compliance[joint]
     product = anchor * crank
 
-    def turn(done: Schedule, torque: np.ndarray) -> np.ndarray:
-        u = done.angle[:, joint] - zero
+    def turn(schedule: Schedule, torque: np.ndarray) -> np.ndarray:
+        u = schedule.angle[:, joint] - zero
         s = np.sqrt(anchor**2 + crank**2 - 2.0 * product * np.cos(u))
-        more = (
-            size
-            * product
-            * (np.cos(u) * (1.0 - free / s) + product * np.sin(u) ** 2 * free / s**3)
+        curvature = (
+            np.cos(u) * (1.0 - free_length / s)
+            + product * np.sin(u) ** 2 * free_length / s**3
         )
-        return (1.0 / (1.0 / compliance + more) - compliance) * torque
+        stiffness = size * product * curvature
+        return (1.0 / (1.0 / compliance + stiffness) - compliance) * torque
 
     return add_gear_law(robot, joint, turn), {}
 
@@ -526,24 +478,25 @@ def compensator_stiffness(
 def stiffening(
     robot: SimulatedRobot, size: float, draws: Draws, joint: int
 ) -> DefectiveRobot:
-    """Teeth that come to bear one after another, each a third: theta = - sum_k d
+    """Three groups of teeth that come to bear one after another: theta = - sum_k d
     sign(tau) max(|tau| - tau_k, 0)."""
-    at = compute_typical_torque_Nm(robot, joint) * np.sort(draws.uniform(0.1, 0.8, 3))
+    thresholds = compute_typical_torque_Nm(robot, joint) * np.sort(
+        draws.uniform(0.1, 0.8, 3)
+    )
     drop = size * robot.compliance[joint] / 3
-    return add_gear_law(
-        robot,
-        joint,
-        lambda _, tau: (
-            -np.sign(tau) * drop * np.maximum(np.abs(tau)[:, None] - at, 0).sum(axis=1)
-        ),
-    ), {}
+
+    def turn(_: Schedule, torque: np.ndarray) -> np.ndarray:
+        excess = np.maximum(np.abs(torque)[:, None] - thresholds, 0)
+        return -np.sign(torque) * drop * excess.sum(axis=1)
+
+    return add_gear_law(robot, joint, turn), {}
 
 
 def lost_motion(
     robot: SimulatedRobot, size: float, draws: Draws, joint: int
 ) -> DefectiveRobot:
-    """Play, of a gap 2 D, between flanks that only a seal's weak spring bridges: theta
-    = D clip(tau / tau_t, -1, 1)."""
+    """Play of a gap 2 D between flanks that only the weak spring of a seal bridges:
+    theta = D clip(tau / tau_t, -1, 1)."""
     closing = compute_typical_torque_Nm(robot, joint) * draws.uniform(0.02, 0.1)
     return add_gear_law(
         robot, joint, lambda _, torque: size * np.clip(torque / closing, -1.0, 1.0)
@@ -553,50 +506,57 @@ def lost_motion(
 def hysteresis(
     robot: SimulatedRobot, size: float, draws: Draws, joint: int
 ) -> DefectiveRobot:
-    """Friction that remembers, theta = -h z, with z by the Bouc-Wen model over a torque
-    tau_h; see `wound`.
+    """Friction with a memory, theta = -h z, where z follows the Bouc-Wen model over a
+    torque tau_h; see `integrate_bouc_wen`.
 
-    An arm that came in the sense s stays behind its drive, z = s with all of its
-    friction wound up; the catalogue counts the half width along the approach. h / tau_h
+    After an approach in direction s the arm lags behind its drive and all friction is
+    wound up, z = s. The catalogue counts the half width along the approach. h / tau_h
     must be less than the gear's compliance, or the arm would recede from a push.
     """
-    over = compute_typical_torque_Nm(robot, joint) * draws.uniform(2.0, 6.0)
+    scale = compute_typical_torque_Nm(robot, joint) * draws.uniform(2.0, 6.0)
 
-    def turn(done: Schedule, torque: np.ndarray, unloaded: np.ndarray) -> np.ndarray:
-        z = done.sense[:, joint].astype(float)
-        now = torque[:, joint]
-        fresh = done.previous < 0
-        z[fresh] = integrate_bouc_wen(
-            z[fresh], (now - unloaded[:, joint])[fresh] / over
-        )
-        # A state follows one of a smaller number, so that in order each finds its past
-        # done.
-        for state in np.flatnonzero(~fresh):
-            before = done.previous[state]
-            z[state] = integrate_bouc_wen(
-                z[before : before + 1], (now[state : state + 1] - now[before]) / over
-            )[0]
+    def turn(
+        schedule: Schedule, torque: np.ndarray, unloaded: np.ndarray
+    ) -> np.ndarray:
+        z = schedule.sense[:, joint].astype(float)
+        load = torque[:, joint]
+        moved = schedule.previous < 0
+        change = (load - unloaded[:, joint])[moved] / scale
+        z[moved] = integrate_bouc_wen(z[moved], change)
+        # A state follows one of a smaller number, so the earlier state is known.
+        for state in np.flatnonzero(~moved):
+            previous = schedule.previous[state]
+            change = (load[state : state + 1] - load[previous]) / scale
+            z[state] = integrate_bouc_wen(z[previous : previous + 1], change)[0]
         return -size * z
 
     return add_laws(robot, "gears", (joint, turn)), {"half_width": -size}
 
 
 def integrate_bouc_wen(z: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """Friction z (S,) of the Bouc-Wen model [1] after the torque, over tau_h, has
-    changed steadily by `change` (S,).
+    """Integrate the Bouc-Wen model [1]_ by the midpoint method.
 
     dz = dx (1 - z^2 (sign(z dx) + 1) / 2): unloading starts along the straight line of
-    slope 1. By the midpoint method.
+    slope 1.
 
-    [1] Wen, Y.-K., Method for random vibration of hysteretic systems, Journal of the Engineering Mechanics Division ASCE 102,
-        1976.
+    Parameters
+    ----------
+    z : (S,) array
+        Friction before the change.
+    change : (S,) array
+        Steady change of the torque divided by tau_h.
+
+    References
+    ----------
+    .. [1] Wen, Y.-K., Method for random vibration of hysteretic systems, Journal of the
+       Engineering Mechanics Division ASCE 102, 1976.
     """
-    step = change / _HISTORY_STEPS
+    step = change / _HYSTERESIS_STEPS
 
     def slope(z: np.ndarray) -> np.ndarray:
         return 1.0 - z**2 * (0.5 * np.sign(z * step) + 0.5)
 
-    for _ in range(_HISTORY_STEPS):
+    for _ in range(_HYSTERESIS_STEPS):
         z = np.clip(z + step * slope(z + 0.5 * step * slope(z)), -1.0, 1.0)
     return z
 
@@ -604,13 +564,13 @@ def integrate_bouc_wen(z: np.ndarray, change: np.ndarray) -> np.ndarray:
 def cable_transmission(
     robot: SimulatedRobot, size: float, draws: Draws, joint: int
 ) -> DefectiveRobot:
-    """Cables of a length that changes as they wind, over the next pulley: theta = s
-    (tau (1 + f q / pi) + tau_o / 2)."""
+    """Cables whose free length changes as they wind, over the next pulley: theta = s
+    (tau (1 + f q / pi) + tau_next / 2)."""
     winding = draws.uniform(0.4, 0.8) * draw_sign(draws)
 
-    def turn(done: Schedule, torque: np.ndarray, _: np.ndarray) -> np.ndarray:
-        free = 1.0 + winding * done.angle[:, joint] / np.pi
-        return size * (torque[:, joint] * free + 0.5 * torque[:, joint + 1])
+    def turn(schedule: Schedule, torque: np.ndarray, _: np.ndarray) -> np.ndarray:
+        length_ratio = 1.0 + winding * schedule.angle[:, joint] / np.pi
+        return size * (torque[:, joint] * length_ratio + 0.5 * torque[:, joint + 1])
 
     return add_laws(robot, "gears", (joint, turn)), {}
 
@@ -618,7 +578,7 @@ def cable_transmission(
 def asymmetric_gear(
     robot: SimulatedRobot, size: float, draws: Draws, joint: int
 ) -> DefectiveRobot:
-    """Flanks of unlike shape: theta = k tau^2, alike for both signs of the torque."""
+    """Flanks of different shape: theta = k tau^2, the same for both signs of tau."""
     size = size * draw_sign(draws)
     return add_gear_law(robot, joint, lambda _, torque: size * torque**2), {}
 
@@ -627,12 +587,12 @@ def warm_softening(
     robot: SimulatedRobot, size: float, draws: Draws, joint: int
 ) -> DefectiveRobot:
     """A gear that softens as it warms: theta = c r (T - 20 °C) tau."""
-    softer = size * robot.compliance[joint]
-    return add_gear_law(
-        robot,
-        joint,
-        lambda done, torque: softer * compute_casting_warming(done.time_s) * torque,
-    ), {}
+    softening = size * robot.compliance[joint]
+
+    def turn(schedule: Schedule, torque: np.ndarray) -> np.ndarray:
+        return softening * compute_casting_warming(schedule.time_s) * torque
+
+    return add_gear_law(robot, joint, turn), {}
 
 
 # Load cell, tracker and warmth
@@ -641,33 +601,29 @@ def warm_softening(
 def set_instrument_error(
     part: str, field: str, robot: SimulatedRobot, size: float, draws: Draws
 ) -> DefectiveRobot:
-    """An error of the tracker or of the cell that is one number; a scale is
-    comparable."""
-    return change_part(robot, part, **{field: size}), {
-        "scale": size
-    } if field == "scale" else {}
+    """Set an error of the tracker or the cell that is one number. A scale is comparable
+    with the catalogue."""
+    parameters = {"scale": size} if field == "scale" else {}
+    return change_part(robot, part, **{field: size}), parameters
 
 
 def add_load_cell_error(
-    error: str, start: str, robot: SimulatedRobot, size: float, draws: Draws
+    error: str, prefix: str, robot: SimulatedRobot, size: float, draws: Draws
 ) -> DefectiveRobot:
-    """An error in a frame that is drawn, of a cell at a location that is drawn.
+    """Add an error of a load cell whose frame and mounting are drawn.
 
-    The catalogue's laws leave the moment as stated; those of a cell in the pull are not
-    comparable.
+    The catalogue's laws do not change the moment, so those of a cell in the line of the
+    pull are not comparable.
     """
     vector = size * draw_direction(draws)
     cell = robot.cell
-    # What is felt beyond what is shown is minus the bias of the display.
+    # The catalogue's bias is applied minus displayed force.
     errors = cell.errors | {error: -vector if error == "bias" else vector}
-    # In the flange's axes or not, beside the errors of the load cell that are so
-    # already.
     in_flange = (*cell.in_flange, error) if draws.integers(2) else cell.in_flange
     mount = cell.mount if error == "shift" else ("pull", "flange")[draws.integers(2)]
+    robot = change_part(robot, "cell", errors=errors, in_flange=in_flange, mount=mount)
     comparable = error == "shift" or mount != "pull"
-    return change_part(
-        robot, "cell", errors=errors, in_flange=in_flange, mount=mount
-    ), name_components(start, vector) if comparable else {}
+    return robot, name_components(prefix, vector) if comparable else {}
 
 
 def frame_drift(robot: SimulatedRobot, size: float, draws: Draws) -> DefectiveRobot:
@@ -676,71 +632,63 @@ def frame_drift(robot: SimulatedRobot, size: float, draws: Draws) -> DefectiveRo
     shift = tuple(size * draw_direction(draws))
     turn = tuple(0.5 * size * draw_direction(draws))
     settling_h = draws.uniform(3.0, 8.0)
-    drift = Motion(
-        shift,
-        turn,
-        lambda time_s: -settling_h * np.expm1(-(time_s / 3600.0) / settling_h),
-    )
-    return change_part(robot, "tracker", drift=drift), {}
+
+    def settle(time_s: np.ndarray) -> np.ndarray:
+        return -settling_h * np.expm1(-(time_s / 3600.0) / settling_h)
+
+    return change_part(robot, "tracker", drift=Motion(shift, turn, settle)), {}
 
 
 def setup_step(robot: SimulatedRobot, size: float, draws: Draws) -> DefectiveRobot:
-    """The tracker's stand is knocked between two rows: a shift, and a turn about the
-    stand of as much at three metres."""
-    after_s = draws.uniform(*_KNOCKED_S)
+    """The tracker's stand is knocked between two rows: a shift, and a rotation about the
+    stand that moves a target at three metres by as much."""
+    knock_time_s = draws.uniform(*_KNOCK_TIMES_S)
     shift = tuple(size * draw_direction(draws))
     turn = tuple(size / 3.0 * draw_direction(draws))
-    return change_part(
-        robot,
-        "tracker",
-        move=Motion(shift, turn, lambda time_s: (time_s > after_s).astype(float)),
-    ), {}
+    move = Motion(shift, turn, lambda time_s: (time_s > knock_time_s).astype(float))
+    return change_part(robot, "tracker", move=move), {}
 
 
 def nest_eccentricity(
     robot: SimulatedRobot, size: float, draws: Draws
 ) -> DefectiveRobot:
-    turns = robot.arm.links[-1].rotation.T @ robot.arm.axes[-1]
-    return change_part(robot, "tracker", nest=(size, int(np.argmax(np.abs(turns))))), {}
+    """A reflector that is not centred in its nest at the flange."""
+    tool_axis = robot.arm.links[-1].rotation.T @ robot.arm.axes[-1]
+    nest = (size, int(np.argmax(np.abs(tool_axis))))
+    return change_part(robot, "tracker", nest=nest), {}
 
 
 def temperature_gradient(
     robot: SimulatedRobot, size: float, draws: Draws, *joints: int
 ) -> DefectiveRobot:
-    """Motors at the foot and a cold tip, beside what the arm grows on average; or a
-    link that is warmer on one side."""
+    """Warm motors at the foot and a cold tip, in addition to the average growth of the
+    arm; or one link that is warmer on one side."""
     arm = robot.arm
     size = size * draw_sign(draws)
     if not joints:
-        share = np.linspace(1.0, -1.0, arm.joints + 1)
-        return thermal_growth(
-            robot,
-            size * (share[[0, -1]] - share @ arm.lengths_m / arm.lengths_m.sum()),
-            draws,
-        )
+        profile = np.linspace(1.0, -1.0, arm.joints + 1)
+        mean = profile @ arm.lengths_m / arm.lengths_m.sum()
+        return thermal_growth(robot, size * (profile[[0, -1]] - mean), draws)
     link = joints[0] + 1
-    about = draws.uniform(0, TURN)
-    bend = size * arm.lengths_m[link] / _LINK_M / SEGMENTS
+    phase = draws.uniform(0, TURN)
+    bend = size * arm.lengths_m[link] / _LINK_THICKNESS_M / SEGMENTS
 
-    def warm(per_kelvin: float) -> Callable[[Schedule, np.ndarray], np.ndarray]:
-        return lambda done, _: per_kelvin * compute_casting_warming(done.time_s)
+    def warm(bend_per_K: float) -> GearLaw:
+        return lambda schedule, _: bend_per_K * compute_casting_warming(schedule.time_s)
 
-    laws = [
-        (f"link{link}_bend{which}", warm(bend * part))
-        for which, part in enumerate((np.cos(about), np.sin(about)))
-    ]
+    tubes = {link: _RIGID} | robot.structure.tubes
     return add_laws(
-        change_part(robot, "structure", tubes={link: _RIGID} | robot.structure.tubes),
+        change_part(robot, "structure", tubes=tubes),
         "springs",
-        *laws,
+        (f"link{link}_bend0", warm(bend * np.cos(phase))),
+        (f"link{link}_bend1", warm(bend * np.sin(phase))),
     ), {}
 
 
 def thermal_growth(
     robot: SimulatedRobot, size: np.ndarray | float, draws: Draws
 ) -> DefectiveRobot:
-    """The castings follow the thermometer with a lag, which the catalogue's law by
-    temperature does not know."""
-    return replace(
-        robot, expansion_per_K=tuple(np.array(robot.expansion_per_K) + size)
-    ), {}
+    """Castings that grow as they follow the thermometer with a lag, which the
+    catalogue's law does not know."""
+    expansion = tuple(np.array(robot.expansion_per_K) + size)
+    return replace(robot, expansion_per_K=expansion), {}

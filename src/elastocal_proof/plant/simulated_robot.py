@@ -421,9 +421,12 @@ def simulate_poses(
     position, rotation : (S, targets, 3) and (S, targets, 3, 3) arrays
         All targets, m, base frame.
     """
-    rest = simulate_equilibrium(robot, schedule, start)[1]
+    equilibrium = simulate_equilibrium(robot, schedule, start)[1]
     return robot.tracker.observe(
-        rest.position, rest.rotation, schedule.time_s, schedule.angle[:, -1]
+        equilibrium.position,
+        equilibrium.rotation,
+        schedule.time_s,
+        schedule.angle[:, -1],
     )
 
 

@@ -58,15 +58,18 @@ class NoncentralityModel:
     ) -> None:
         self.robot = robot
         self.schedule = schedule
-        model, rest = simulate_equilibrium(robot, schedule)
-        self._start = rest.coordinates[:, model.gear]
+        model, equilibrium = simulate_equilibrium(robot, schedule)
+        self._start = equilibrium.coordinates[:, model.gear]
         self.poses = robot.tracker.observe(
-            rest.position, rest.rotation, schedule.time_s, schedule.angle[:, -1]
+            equilibrium.position,
+            equilibrium.rotation,
+            schedule.time_s,
+            schedule.angle[:, -1],
         )
-        jacobian, torques = _linearize(model, rest.coordinates, robot, declared)
+        jacobian, torques = _linearize(model, equilibrium.coordinates, robot, declared)
         # Each compliance turns its own gear in proportion to the torque on it; each
         # standard deviation of a weight turns all gears.
-        torque = rest.force[:, model.gear]
+        torque = equilibrium.force[:, model.gear]
         turns = [torque * unit for unit in np.eye(robot.arm.joints)]
         turns += [robot.compliance * torque for torque in torques]
         columns = [
@@ -152,7 +155,7 @@ def _linearize(
     robot: SimulatedRobot,
     declared: Sequence[LinkMass],
 ) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Linearize the poses and the gravity torques of an arm at rest.
+    """Linearize the poses and the gravity torques of an arm at equilibrium.
 
     Returns
     -------

@@ -1,1 +1,1 @@
-"""The blind proof as a page of the documentation."""
+"""The blind benchmark as a page of the documentation."""

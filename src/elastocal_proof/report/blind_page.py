@@ -1,4 +1,4 @@
-"""Targets of the blind proof as a page in Markdown, for docs/."""
+"""Write the targets of the blind benchmark as a page in Markdown, for docs/."""
 
 from __future__ import annotations
 
@@ -29,84 +29,107 @@ _OUTCOMES = {"True": "reached", "False": "missed"}
 def format_targets_page(
     plan: Plan,
     summary: pd.DataFrame,
-    of_each: Mapping[str, pd.DataFrame],
+    summaries_by_robot: Mapping[str, pd.DataFrame],
     size: str,
     seed: int,
 ) -> str:
-    """Every quantity of a summary beside its target; `of_each`: of
-    `summary.summarize_by_robot`, by what the robots are called."""
+    """Format the page that compares every quantity of a summary with its target.
+
+    Parameters
+    ----------
+    plan
+        Plan of the blind benchmark.
+    summary
+        Summary of all robots together.
+    summaries_by_robot
+        Tables of `summary.summarize_by_robot` by the names of the robots.
+    size, seed
+        Configuration of the run.
+    """
+    rows = tabulate_targets(plan, summary, summaries_by_robot)
     return f"""# Targets of the blind proof
 
-Written by `snakemake -j2 blind_pictures --config blind={size} seed={seed}`; [what it means](blind_proof.md). "At 50" is at a
-non-centrality of 50. Brackets hold 95 % intervals: of shares Clopper–Pearson, of the others a bootstrap over cases.
+Written by `snakemake -j2 blind_pictures --config blind={size} seed={seed}`; \
+[what it means](blind_proof.md). "At 50" is at a
+non-centrality of 50. Brackets hold 95 % intervals: of shares Clopper–Pearson, \
+of the others a bootstrap over cases.
 
 {describe_reached_targets(summary)}
 
-{format_table(tabulate_targets(plan, summary, of_each))}
+{format_table(rows)}
 """
 
 
 def describe_reached_targets(summary: pd.DataFrame) -> str:
-    """How many targets are reached."""
+    """Say how many targets are reached, and on which robots."""
     judged = select_targets(summary).dropna(subset="holds")
-    held = int((judged.holds.astype(str) == "True").sum())
-    proven = summary.robots.iloc[0] == PROOF
-    where = (
-        "the robots of the proof"
-        if proven
-        else "robots on which the method was developed, which proves nothing"
-    )
-    return f"{held} of {format_count(len(judged), 'figure')} with a target reach it on {where}."
+    reached = int((judged.holds.astype(str) == "True").sum())
+    robots = "robots on which the method was developed, which proves nothing"
+    if summary.robots.iloc[0] == PROOF:
+        robots = "the robots of the proof"
+    figures = format_count(len(judged), "figure")
+    return f"{reached} of {figures} with a target reach it on {robots}."
 
 
 def tabulate_targets(
-    plan: Plan, summary: pd.DataFrame, of_each: Mapping[str, pd.DataFrame]
+    plan: Plan, summary: pd.DataFrame, summaries_by_robot: Mapping[str, pd.DataFrame]
 ) -> list[dict[str, str]]:
-    """Each quantity with a target as a row of words, beside what every robot has alone
-    and what the best analyst finds."""
-    of_all = {row.quantity: row for row in iterate_rows(summary)}
-    alone = {
-        name: {row.quantity: row for row in iterate_rows(one)}
-        for name, one in of_each.items()
+    """Tabulate each quantity with a target, for all robots together and for each one,
+    and for the best possible analyst.
+
+    Parameters are those of `format_targets_page`.
+    """
+    overall = _index_by_quantity(summary)
+    by_robot = {
+        name: _index_by_quantity(table) for name, table in summaries_by_robot.items()
     }
-    beside = {
+    # The analyst of the limit sees a sample. These quantities of the sample are shown with
+    # the same quantity of all cases.
+    quantity_of_all = {
         figure["words"]: figure["beside"]
         for figure in plan["figures"]
         if "beside" in figure
     }
     rows = []
-    for row in iterate_rows(select_targets(summary)):
-        compared = row.quantity.removesuffix(OVER_THE_BEST)
-        found = of_all.get(beside.get(compared), row)
-        limit = of_all.get(f"{compared}{BY_THE_BEST}")
+    for target in iterate_rows(select_targets(summary)):
+        quantity = target.quantity.removesuffix(OVER_THE_BEST)
+        shown: Any = overall.get(quantity_of_all.get(quantity, ""), target)
+        limit = overall.get(f"{quantity}{BY_THE_BEST}")
         cells = {
-            "quantity": found.quantity,
-            "target": row.target,
-            "outcome": _OUTCOMES.get(str(row.holds), "no case"),
+            "quantity": shown.quantity,
+            "target": target.target,
+            "outcome": _OUTCOMES.get(str(target.holds), "no case"),
+            "robots together": _format_interval(shown),
+            "cases": _format_hits(shown),
         }
-        cells |= {"robots together": _with_interval(found), "cases": _hits(found)}
-        cells |= {
-            name: _value(each[found.quantity]) if found.quantity in each else _ABSENT
-            for name, each in alone.items()
-        }
+        for name, quantities in by_robot.items():
+            cells[name] = _ABSENT
+            if shown.quantity in quantities:
+                cells[name] = _format_rate(quantities[shown.quantity])
         if limit:
-            cells["limit, on a sample"] = f"{_with_interval(limit)}, {_hits(limit)}"
-            cells["found over limit, same sample"] = _with_interval(row)
+            cells["limit, on a sample"] = (
+                f"{_format_interval(limit)}, {_format_hits(limit)}"
+            )
+            cells["found over limit, same sample"] = _format_interval(target)
         rows.append(cells)
     return rows
 
 
-def _with_interval(row: Any) -> str:
+def _index_by_quantity(summary: pd.DataFrame) -> dict[str, Any]:
+    return {row.quantity: row for row in iterate_rows(summary)}
+
+
+def _format_interval(row: Any) -> str:
     if pd.isna(row.low):
-        return f"{_value(row)} ({_ABSENT})"
-    if _is_ratio(row):
-        return (
-            f"{_value(row)} ({format_number(row.low, 4)}–{format_number(row.high, 4)})"
-        )
-    return f"{_value(row)} ({100 * row.low:.1f}–{100 * row.high:.1f} %)"
+        interval = _ABSENT
+    elif _is_ratio(row):
+        interval = f"{format_number(row.low, 4)}–{format_number(row.high, 4)}"
+    else:
+        interval = f"{100 * row.low:.1f}–{100 * row.high:.1f} %"
+    return f"{_format_rate(row)} ({interval})"
 
 
-def _value(row: Any) -> str:
+def _format_rate(row: Any) -> str:
     if pd.isna(row.rate):
         return _ABSENT
     return format_number(row.rate, 4) if _is_ratio(row) else f"{100 * row.rate:.1f} %"
@@ -116,26 +139,18 @@ def _is_ratio(row: Any) -> bool:
     return str(row.quantity).startswith("held-out RMS after, over")
 
 
-def _hits(row: Any) -> str:
-    return (
-        format_integer(int(row.cases))
-        if pd.isna(row.hits)
-        else f"{format_integer(int(row.hits))} of {format_integer(int(row.cases))}"
-    )
+def _format_hits(row: Any) -> str:
+    cases = format_integer(int(row.cases))
+    return cases if pd.isna(row.hits) else f"{format_integer(int(row.hits))} of {cases}"
 
 
 def write_blind_page(job: Any) -> None:
-    """The page, from reports/blind/."""
-    asked, (summary, cases) = (
-        job.params,
-        (pd.read_csv(job.input[name]) for name in ("summary", "cases")),
-    )
+    """Write the page from reports/blind/."""
+    params = job.params
+    summary = pd.read_csv(job.input.summary)
+    cases = pd.read_csv(job.input.cases)
     names = {Path(file).stem: read_document(file)["name"] for file in job.input.robots}
-    alone = {
-        names[robot]: table
-        for robot, table in summarize_by_robot(asked.plan, cases, asked.seed).items()
-    }
-    write_text(
-        job.output.page,
-        format_targets_page(asked.plan, summary, alone, asked.size, asked.seed),
-    )
+    tables = summarize_by_robot(params.plan, cases, params.seed)
+    by_robot = {names[robot]: table for robot, table in tables.items()}
+    page = format_targets_page(params.plan, summary, by_robot, params.size, params.seed)
+    write_text(job.output.page, page)
