@@ -25,7 +25,11 @@ from elastocal.fitting.model import Case
 from elastocal.fitting.noise import Noise, fit_declared_model
 from elastocal.loop.whole import read_cases
 from elastocal.residual_model.repeatable import detect_repeatable_residual
-from elastocal.residual_model.selection import build_inputs, validate_residual_model
+from elastocal.residual_model.selection import (
+    ResidualModelPlan,
+    build_inputs,
+    validate_residual_model,
+)
 from elastocal.validation.held_out import compute_position_residuals
 from elastocal.validation.transfer import transfer_fit
 
@@ -129,15 +133,8 @@ if __name__ == "__main__":
             alone = compute_position_residuals(
                 *transfer_fit(fitted, case, held_out), held_out.observations
             )
-            validated = validate_residual_model(
-                fitted,
-                case,
-                held_out,
-                "auto",
-                blocks=False,
-                within_range=True,
-                seed=seed,
-            )
+            plan = ResidualModelPlan("auto", blocks=False, within_range=True, seed=seed)
+            validated = validate_residual_model(fitted, case, held_out, plan)
             squares = [
                 (residual**2).sum(axis=1)
                 for residual in (alone, validated.residual, chance)

@@ -139,7 +139,7 @@ class DataFault:
     parameters : tuple of FaultValue
         Numbers that describe it.
     alternatives : tuple of str
-        What would explain the measurements as well, in words.
+        Other explanations of the measurements, in words.
     evidence : tuple of (float or None)
         RMS residual as written and with the correction, m.
     """
@@ -497,8 +497,8 @@ class HalfWidths:
 
 
 @dataclass(frozen=True)
-class Remainder:
-    """A regression on the residuals of the final model, judged on validation poses.
+class RegressionChoice:
+    """A regression on the residuals of a model, chosen by its training poses.
 
     Attributes
     ----------
@@ -512,6 +512,22 @@ class Remainder:
         Scale of its intervals.
     left_out : CrossValidatedGain or None
         Its gain; None with too few configurations.
+    """
+
+    regression: str
+    words: str
+    seed: int
+    setting: dict[str, Any] | None
+    spread: Spread | None
+    left_out: CrossValidatedGain | None
+
+
+@dataclass(frozen=True)
+class Remainder(RegressionChoice):
+    """A regression on the residuals of the final model, judged on validation poses.
+
+    Attributes
+    ----------
     errors : ErrorSummary
         Errors of the validation poses with it.
     rms_ci95_m, reduction_ci95 : tuple of float
@@ -527,12 +543,6 @@ class Remainder:
         Sizes of these intervals.
     """
 
-    regression: str
-    words: str
-    seed: int
-    setting: dict[str, Any] | None
-    spread: Spread | None
-    left_out: CrossValidatedGain | None
     errors: ErrorSummary
     rms_ci95_m: tuple[float, float]
     reduction_ci95: tuple[float, float]
@@ -574,7 +584,7 @@ class Accuracy:
     confidence : float
         Confidence of the limits.
     fitted : bool
-        Whether anything of the robot was fitted; otherwise no error of 0 is one.
+        Whether any parameter of the robot was fitted; if not, there is no prediction.
     """
 
     frame: str

@@ -1,4 +1,4 @@
-"""The pictures of the league show every data set, method and mechanism once."""
+"""Figures of the benchmark show every data set, method and mechanism once."""
 
 import pandas as pd
 import pytest
@@ -17,9 +17,8 @@ METHODS = {
 
 @pytest.fixture(scope="module")
 def table():
-    return compare_methods(
-        make_results(), {"A robot": ["one"], "Another": ["two"]}, "geometry", 1
-    )
+    robots = {"A robot": ["one"], "Another": ["two"]}
+    return compare_methods(make_results(), robots, "geometry", 1)
 
 
 def test_each_split_has_a_panel_and_each_method_a_mark_in_the_legend(table):
@@ -31,23 +30,35 @@ def test_each_split_has_a_panel_and_each_method_a_mark_in_the_legend(table):
     ]
     assert legend_entries(figure) == [f"{name} in words" for name in METHODS]
     assert row_labels(figure.axes[0]) == ["one\n30 poses", "two\n40 poses"]
-    assert len(draw_method_errors(table[table["split"] == "blocks"], METHODS).axes) == 1
 
 
-def mechanisms(probability):
-    row = {"robot": "A robot", "data": "one", "probability": probability, "share": 0.4}
-    return pd.DataFrame(
+def test_a_split_that_no_data_set_has_gets_no_panel(table):
+    blocks = table[table["split"] == "blocks"]
+    assert len(draw_method_errors(blocks, METHODS).axes) == 1
+
+
+def draw_two_mechanisms(probability):
+    """Figure of one mechanism with this probability, and an improbable one."""
+    row = {"robot": "A robot", "data": "one", "share": 0.4}
+    table = pd.DataFrame(
         [
-            row | {"mechanism": "link_weight"},
+            row | {"mechanism": "link_weight", "probability": probability},
             row | {"mechanism": "payload", "probability": 0.1},
         ]
     )
+    return draw_mechanisms(table)
 
 
-def test_mechanisms_that_are_nowhere_probable_are_left_out():
-    figure = draw_mechanisms(mechanisms(0.9))
-    labels = row_labels(figure.axes[0])
-    assert len(labels) == 1 and "40 %" in [
-        text.get_text() for text in figure.axes[0].texts
-    ]
-    assert "No data set" in draw_mechanisms(mechanisms(0.3)).axes[0].texts[0].get_text()
+def read_texts(axis):
+    return [text.get_text() for text in axis.texts]
+
+
+def test_mechanisms_that_are_improbable_everywhere_are_left_out():
+    axis = draw_two_mechanisms(0.9).axes[0]
+    assert len(row_labels(axis)) == 1
+    assert "40 %" in read_texts(axis)
+
+
+def test_a_note_replaces_the_figure_if_no_mechanism_is_probable():
+    axis = draw_two_mechanisms(0.3).axes[0]
+    assert "No data set" in read_texts(axis)[0]

@@ -231,7 +231,7 @@ def test_dh_tables_and_kinematics_of_ros_drivers_are_imported_or_refused(
         path,
         content,
         lambda: write_and_read_robot(
-            folder, robot_from_dh(path, modified, DhOptions(angles, "m"))
+            folder, robot_from_dh(path, DhOptions(angles, "m"), modified=modified)
         ),
     )
 

@@ -96,7 +96,7 @@ from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.importers import find_importer
 from elastocal.campaigns.reading import read_campaign, read_robot
 from elastocal.effects.catalogue import candidates_on, list_bundled_effects, list_effects
-from elastocal.exchange.controllers import axes_of, find_controller, targets_of
+from elastocal.exchange.controllers import find_axes, find_controller, build_targets
 from elastocal.io.origin import list_versions
 from elastocal.loop.loading import load_campaign
 from elastocal.mechanics.sites import build_sites
@@ -120,10 +120,10 @@ descriptions, _, _ = load_campaign(
 )
 controller = find_controller("lines")
 turning = (False, False)
-targets = targets_of(np.zeros((1, 2)), turning, axes_of(controller, turning, ""))
+targets = build_targets(np.zeros((1, 2)), turning, find_axes(controller, turning, ""))
 inputs = Inputs(np.zeros((2, 6)), np.zeros((2, 0)), np.zeros((2, 3, 6)))
 regression = list_regressions()["mean_residual"]
-(predictor,) = regression.fitted(inputs, np.ones((2, 3)), ({},), 1)
+(predictor,) = regression.fit(inputs, np.ones((2, 3)), ({},), 1)
 print(json.dumps({
     "keys": [key for key in candidates if key.startswith("hoses")],
     "new effects": sorted(set(list_effects()) - set(list_bundled_effects())),

@@ -1,4 +1,4 @@
-"""Tables of the league have columns with units and meanings."""
+"""Tables of the benchmark have columns with units and meanings."""
 
 import pytest
 
@@ -6,8 +6,7 @@ from elastocal_proof.league import schemas
 
 
 @pytest.mark.parametrize("schema", [schemas.FOLDS, schemas.MECHANISMS, schemas.ENTRIES])
-def test_columns_are_named_once_and_say_what_they_are(schema):
+def test_columns_have_unique_names_and_a_meaning(schema):
     names = [column.name for column in schema.columns]
-    assert len(set(names)) == len(names) and all(
-        column.meaning for column in schema.columns
-    )
+    assert len(set(names)) == len(names)
+    assert all(column.meaning for column in schema.columns)

@@ -19,7 +19,7 @@ from elastocal.campaigns.importers import find_importer
 from elastocal.campaigns.reading import read_campaign, read_robot
 from elastocal.effects.conditions import build_conditions
 from elastocal.effects.protocol import Effect
-from elastocal.exchange.controllers import CONTROLLERS, axes_of, targets_of
+from elastocal.exchange.controllers import CONTROLLERS, build_targets, find_axes
 from elastocal.io.documents import check_document, read_document
 from elastocal.mechanics.sites import build_sites
 from elastocal.study.strategies import check_strategy, strategy_from_document
@@ -168,7 +168,7 @@ def test_the_language_writes_targets(import_example):
     language = import_example(example("A controller's language")).LINES
     assert language.name not in CONTROLLERS
     shifts = (True, *6 * (False,))
-    targets = targets_of(
-        np.array([[0.5, *6 * (np.pi / 6,)]]), shifts, axes_of(language, shifts, "")
+    targets = build_targets(
+        np.array([[0.5, *6 * (np.pi / 6,)]]), shifts, find_axes(language, shifts, "")
     )
     assert language.program("GO", targets) == f"GO\n{6 * '30.000000 '}500.000000\n"

@@ -19,6 +19,11 @@ from elastocal_proof.report.blind_page import (
 )
 
 
+def split_cells(row):
+    """Cells of a row of a Markdown table."""
+    return [cell.strip() for cell in row.strip("|").split("|")]
+
+
 def test_each_quantity_has_its_target_its_limit_and_a_column_for_each_robot():
     pairs = [
         make_truth(("payload",), ("joint_tilt", 2), group="pair", robot=robot)
@@ -44,11 +49,10 @@ def test_each_quantity_has_its_target_its_limit_and_a_column_for_each_robot():
     assert (
         page.startswith("# ") and "blind_pictures --config blind=full seed=7`" in page
     )
-    rows = [
-        [cell.strip() for cell in line.strip("|").split("|")]
-        for line in page.splitlines()
-        if line.startswith("| ")
-    ]
+    rows = []
+    for line in page.splitlines():
+        if line.startswith("| "):
+            rows.append([cell.strip() for cell in line.strip("|").split("|")])
     figures = {row[0]: dict(zip(rows[0], row, strict=True)) for row in rows[1:]}
     # A quantity without a case has no row.
     assert len(figures) == len(rows) - 1 == int((summary.target != "").sum())
@@ -64,11 +68,9 @@ def test_each_quantity_has_its_target_its_limit_and_a_column_for_each_robot():
         "found over limit, same sample": "50.0 % (0.0–100.0 %)",
     }
     alarms = figures["false alarms, 3 kN"]
-    assert (alarms["outcome"], alarms["cases"], alarms["limit, on a sample"]) == (
-        "no case",
-        "0 of 0",
-        "",
-    )
+    assert alarms["outcome"] == "no case"
+    assert alarms["cases"] == "0 of 0"
+    assert alarms["limit, on a sample"] == ""
 
 
 def test_the_number_of_reached_targets_names_the_robots():

@@ -299,7 +299,8 @@ def select_regression_inputs(
         calibrated.model, calibrated.estimate, select_states(observations, active)
     )
     offset_m = np.broadcast_to(residual_model.target_offset_m, (len(inputs), 3))
-    inputs = replace(inputs, others=np.hstack([inputs.others[:, :-3], offset_m]))
+    covariates = np.hstack([inputs.covariates[:, :-3], offset_m])
+    inputs = replace(inputs, covariates=covariates)
     return active, inputs
 
 

@@ -1,3 +1,3 @@
-"""A measured campaign: its files, checked as they are read; simulated ones; other
-people's data and their importers. Nothing is fitted.
+"""Measured campaigns: their files, which are checked as they are read, simulated
+campaigns, and importers of public data. Nothing is fitted.
 """

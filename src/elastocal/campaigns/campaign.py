@@ -26,7 +26,7 @@ NO_ROTATION = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Target:
-    """What is tracked.
+    """A point of the robot that is tracked.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class Campaign:
     measured : "position" or "pose".
     frame : "base", or "tracker": the placement of the base is unknown, and different in
         each session.
-    targets : what is tracked.
+    targets : tracked points of the robot.
     compliance : "nominal" or "identify".
     declared : effects that the declared model has.
     noise : declared noise, if any.

@@ -122,7 +122,7 @@ def list_poses(measurements: Measurements) -> tuple[np.ndarray, np.ndarray]:
 def _find_lost_poses(
     measurements: Measurements, pose: np.ndarray, reported_zero: np.ndarray
 ) -> np.ndarray:
-    """Find the poses (P,) of which all angles and positions are zeros."""
+    """Find the poses (P,) whose angles and positions are all zeros."""
     has_angles = (measurements.joint_angles != reported_zero).any(axis=1)
     has_content = has_angles | measurements.position.any(axis=1)
     return np.asarray(np.bincount(pose, has_content) == 0)

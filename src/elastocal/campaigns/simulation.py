@@ -24,7 +24,7 @@ from elastocal.random_streams import open_stream
 
 @dataclass(frozen=True)
 class Plan:
-    """What is measured.
+    """Plan of the measurements.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ def draw_measurements(
     Parameters
     ----------
     robot : robot that is measured.
-    plan : what is measured.
+    plan : plan of the measurements.
     seed, name : seed and name of the campaign, which name the random stream.
 
     Returns

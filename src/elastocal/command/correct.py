@@ -125,9 +125,9 @@ class _Program:
 
     def name_axes(self, robot: Robot) -> tuple[str, ...]:
         """Return the controller's names of q1, q2, ..."""
-        from elastocal.exchange.controllers import axes_of
+        from elastocal.exchange.controllers import find_axes
 
-        return axes_of(self.controller, robot.chain.prismatic, self.stated_axes)
+        return find_axes(self.controller, robot.chain.prismatic, self.stated_axes)
 
     def describe(self, axis_names: tuple[str, ...]) -> str:
         """Say which controller reads the program, and what it calls the joints."""
@@ -180,7 +180,7 @@ def _write_targets(
 ) -> None:
     """Write the CSV of joint targets and the program, both or none."""
     from elastocal.application.path_correction import describe_program, tabulate_targets
-    from elastocal.exchange.controllers import targets_of
+    from elastocal.exchange.controllers import build_targets
     from elastocal.io.atomic_writes import write_text, write_together
     from elastocal.io.data_frames import write_csv
 
@@ -190,7 +190,7 @@ def _write_targets(
     with write_together(output.parent, names) as partial:
         write_csv(partial / output.name, tabulate_targets(corrected))
         if program:
-            targets = targets_of(
+            targets = build_targets(
                 corrected.correction.joint_angles,
                 corrected.calibrated.robot.chain.prismatic,
                 axis_names,

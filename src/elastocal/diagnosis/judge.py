@@ -30,6 +30,7 @@ from elastocal.io.typed_json import from_document, to_document
 from elastocal.random_streams import open_stream
 from elastocal.residual_model.selection import (
     CorrectedResiduals,
+    ResidualModelPlan,
     summarize_residual_model,
     validate_residual_model,
 )
@@ -194,10 +195,9 @@ def _state_remainder(
     """State what a regression on the residual of the final model improves."""
     case = diagnosis.case
     stream = open_stream(seed, case.campaign.name, "remainder", 0)
-    facts = summarize_residual_model(
+    return summarize_residual_model(
         delivered, diagnosis.declared, diagnosis.final, case, held_out, stream
     )
-    return from_document(Remainder, facts, "regression on the remainder")
 
 
 def apply_regression(
@@ -224,15 +224,13 @@ def apply_regression(
         return None
     # Poses that were held out at random have neighbours among the fitted ones. Others
     # have none, and the poses that set the intervals must not have any either.
-    return validate_residual_model(
-        diagnosis.final,
-        diagnosis.case,
-        held_out,
+    plan = ResidualModelPlan(
         campaign.remainder,
         blocks="fraction" not in campaign.holdout,
         within_range=True,
         seed=seed,
     )
+    return validate_residual_model(diagnosis.final, diagnosis.case, held_out, plan)
 
 
 def remove_gross_errors(

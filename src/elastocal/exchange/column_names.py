@@ -1,9 +1,9 @@
-"""Recognize the columns of tables of other programs, and their units.
+"""Recognize the columns of tables from other programs, and their units.
 
 A column is recognized by its usual names, such as ``J1``, ``A1``, ``Joint 1`` or ``q1
 [deg]`` for the first joint. Its unit is in brackets or behind the name (``x_mm``), in a
 row under the names, or an option states it. Orientations have several notations, some of
-which are recognized by their columns. Errors ask the user about what is ambiguous.
+which are recognized by their columns. If a table is ambiguous, an error asks the user.
 """
 
 import itertools
@@ -70,7 +70,9 @@ NO_ROTATION = "none"
 QUATERNIONS = "quaternion"
 HOMOGENEOUS_MATRICES = "homogeneous"
 EULER_ANGLES = "euler:"
-# Columns of each notation; those that say by themselves what they are come first.
+# Three axes, neighbouring ones different.
+_EULER_NOTATION = re.compile(r"euler:(?!.*(.)\1)([XYZ]{3}|[xyz]{3})")
+# Columns of each notation. The columns of the first three identify their notation.
 _NOTATIONS: dict[str, tuple[str, ...]] = {
     HOMOGENEOUS_MATRICES: HOMOGENEOUS,
     QUATERNIONS: QUATERNION,
@@ -87,21 +89,24 @@ _ALLOWED = (
 # Upper bound on the error of a quaternion's length and of a matrix product R' R; rounding
 # to four digits causes less.
 UNIT_LENGTH = 2e-3
+# A header with a unit, or with an index, in brackets.
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*(.*?)\s*[\])]\s*")
 _INDEX = re.compile(r"([^\[(]*?)\s*[\[(]\s*([0-9]+)\s*[\])](.*)", re.ASCII)
-# Units that a column has if none is stated. Angles and lengths have two usual units each
-# and must be stated.
+# Units of columns without a stated unit. Angles and lengths have two usual units each, so
+# that theirs must be stated.
 _USUAL = {FORCE: "N", MOMENT: "Nm", TIME: "s", TEMPERATURE: "C"}
 # How people write that a column has no unit.
 _NO_UNIT = ("", "-", "1", "#", "–", "none")
-_BEHIND = re.compile(r"(.+?)[_/ ]([A-Za-zµ°]+)")
+# A header that ends with a unit, such as ``x_mm``.
+_UNIT_AT_END = re.compile(r"(.+?)[_/ ]([A-Za-zµ°]+)")
 # Names of joint angles. A joint has at most two digits; a larger number does not belong
 # to a joint.
 _JOINT = re.compile(
     r"(q|j|a|axis|joint|theta|jointangle|actualq|targetq|qactual|rax|jointpos|jointposition|jointpositions|joints)([0-9]{1,2})"
 )
 _APPROACH = re.compile(r"(?:approach|direction)([0-9]{1,2})")
-_PLACES = (
+# Names of a position along an axis, and other names of columns.
+_POSITIONS = (
     "p{}",
     "pos{}",
     "position{}",
@@ -110,11 +115,17 @@ _PLACES = (
     "translation{}",
     "point{}",
 )
-_ALSO = {
-    **{axis: tuple(place.format(axis) for place in _PLACES) for axis in "xyz"},
+_SYNONYMS = {
+    "x": tuple(name.format("x") for name in _POSITIONS),
+    "y": tuple(name.format("y") for name in _POSITIONS),
+    "z": tuple(name.format("z") for name in _POSITIONS),
     **{
-        f"q{part}": (f"quat{part}", f"orientation{part}", f"rotation{part}")
-        for part in "wxyz"
+        f"q{component}": (
+            f"quat{component}",
+            f"orientation{component}",
+            f"rotation{component}",
+        )
+        for component in "wxyz"
     },
     **{f"f{axis}": (f"force{axis}",) for axis in "xyz"},
     **{f"m{axis}": (f"moment{axis}", f"torque{axis}") for axis in "xyz"},
@@ -131,18 +142,16 @@ _ALSO = {
     "temperature_c": ("temperature", "temp"),
     "u95_m": ("u95", "expandeduncertainty"),
 }
-_KNOWN = {
-    other: name
-    for name, others in _ALSO.items()
-    for other in (name.replace("_", ""), *others)
-}
-# Euler angles are named by options alone: E1 to E3 may be external axes.
-_KNOWN |= {name: name for name in (*MATRIX, *HOMOGENEOUS)}
+# Names of columns by their simplified headers. Only options name Euler angles, because E1
+# to E3 may be external axes.
+_NAMES = {name: name for name in (*MATRIX, *HOMOGENEOUS)}
+for _name, _synonyms in _SYNONYMS.items():
+    _NAMES |= dict.fromkeys((_name.replace("_", ""), *_synonyms), _name)
 
 
-def kind_of(name: str) -> tuple[str, ...]:
-    """Kinds of quantities that a column may hold, keys of `UNITS`, by the name that
-    this module gives it."""
+def list_kinds(name: str) -> tuple[str, ...]:
+    """List the kinds of quantities, keys of `UNITS`, that a column of this name may
+    hold."""
     if re.fullmatch(r"q[0-9]+", name):
         # A prismatic joint reports a length.
         return ANGLE, LENGTH
@@ -156,22 +165,22 @@ def kind_of(name: str) -> tuple[str, ...]:
 
 
 def is_name(name: str) -> bool:
-    """Whether a column of that name can be imported."""
+    """Decide whether a column of this name can be imported."""
     return (
-        name in {*_KNOWN.values(), *EULER}
+        name in {*_NAMES.values(), *EULER}
         or re.fullmatch(r"(q|approach)[1-9][0-9]?", name) is not None
     )
 
 
 def has_position(names: Collection[str | None]) -> bool:
-    """Whether names of columns are those of a position, by itself or in a homogeneous
-    matrix."""
+    """Decide whether columns of these names have a position, by itself or in a
+    homogeneous matrix."""
     return set(POSITION) <= set(names) or set(TRANSLATION) <= set(names)
 
 
-def lengths_in(headers: Iterable[str]) -> list[str]:
-    """List headers of lengths that belong to no position, as of a draw wire or a ball
-    bar."""
+def find_lengths(headers: Iterable[str]) -> list[str]:
+    """Find headers of lengths that belong to no position, such as those of a draw wire or
+    a ball bar."""
     names = ("l", "length", "distance", "wirelength", "wire")
     lengths = []
     for header in headers:
@@ -183,21 +192,24 @@ def lengths_in(headers: Iterable[str]) -> list[str]:
 
 
 def find_joints(names: Iterable[str]) -> list[str]:
-    """List the names of joint angles among names, in the order of the joints."""
+    """Find the names of joint angles, in the order of the joints."""
     angles = [name for name in names if re.fullmatch(r"q[0-9]+", name)]
     joints = sorted(int(name[1:]) for name in angles)
     return [f"q{joint}" for joint in joints]
 
 
 def _scale(unit: str, kinds: Iterable[str]) -> float | None:
-    """SI value of one unit, if it is one of some kinds."""
-    plain = _simplify_unit(unit)
-    return next((UNITS[kind][plain] for kind in kinds if plain in UNITS[kind]), None)
+    """SI value of a unit, or None if it belongs to none of these kinds."""
+    symbol = _simplify_unit(unit)
+    for kind in kinds:
+        if symbol in UNITS[kind]:
+            return UNITS[kind][symbol]
+    return None
 
 
-def scales_of(units: Mapping[str, str]) -> dict[str, float]:
-    """SI values of the units of columns, by their names."""
-    return {name: _scale(unit, kind_of(name)) or 1.0 for name, unit in units.items()}
+def find_scales(units: Mapping[str, str]) -> dict[str, float]:
+    """Find the SI values of the units of columns, by the names of the columns."""
+    return {name: _scale(unit, list_kinds(name)) or 1.0 for name, unit in units.items()}
 
 
 def read_units(cells: Sequence[str]) -> list[str] | None:
@@ -212,42 +224,40 @@ def read_units(cells: Sequence[str]) -> list[str] | None:
 
 
 def recognize_column(header: str) -> tuple[str | None, str | None]:
-    """Name of a column and unit, each None where the header does not say it.
+    """Recognize name and unit of a column; each is None if the header does not state it.
 
-    A number in brackets is an index, whatever else stands there a unit.
+    A number in brackets is an index; any other text in brackets is a unit.
     """
     text, unit = split_unit(header)
     name = _find_name(text)
     if name is not None and unit is None:
-        return name, {"time_s": "s", "temperature_c": "C", "u95_m": "m"}.get(
-            header.lower()
-        )
+        unit = {"time_s": "s", "temperature_c": "C", "u95_m": "m"}.get(header.lower())
     return name, unit
 
 
 def split_unit(header: str) -> tuple[str, str | None]:
-    """A header without its unit, and the unit; an index in brackets is a part of the
-    name."""
+    """Split a header into its text and its unit; an index in brackets belongs to the
+    text."""
     index = _INDEX.fullmatch(header)
     if index and index[1]:
-        # Of a name with a number an index is one too many.
-        header = f"{index[1]}{' index ' if index[1][-1].isdigit() else ''}{index[2]}{index[3]}"
-    if bracketed := _BRACKETS.fullmatch(header):
-        return bracketed[1], _simplify_unit(bracketed[2]) or None
-    behind = _BEHIND.fullmatch(header)
-    if (
-        _find_name(header) is None
-        and behind
-        and any(_simplify_unit(behind[2]) in units for units in UNITS.values())
-    ):
-        name = _find_name(behind[1])
-        if name is None or _scale(behind[2], kind_of(name)) is not None:
-            return behind[1], _simplify_unit(behind[2])
+        # A name that ends with a digit must not absorb the index.
+        separator = " index " if index[1][-1].isdigit() else ""
+        header = f"{index[1]}{separator}{index[2]}{index[3]}"
+    in_brackets = _BRACKETS.fullmatch(header)
+    if in_brackets:
+        return in_brackets[1], _simplify_unit(in_brackets[2]) or None
+    at_end = _UNIT_AT_END.fullmatch(header)
+    if at_end and _find_name(header) is None:
+        text, unit = at_end.groups()
+        name = _find_name(text)
+        kinds = UNITS if name is None else list_kinds(name)
+        if _scale(unit, kinds) is not None:
+            return text, _simplify_unit(unit)
     return header, None
 
 
 def _find_name(text: str) -> str | None:
-    """Name of a column that is called so, None if it is unknown."""
+    """Find the name of a column from its header, None if it is unknown."""
     plain = _simplify(text)
     for pattern, letter in ((_JOINT, "q"), (_APPROACH, "approach")):
         match = pattern.fullmatch(plain)
@@ -256,7 +266,7 @@ def _find_name(text: str) -> str | None:
             # If a table counts from joint 0, an option must state the first joint.
             if number:
                 return f"{letter}{number}"
-    return _KNOWN.get(plain)
+    return _NAMES.get(plain)
 
 
 def _simplify(text: str) -> str:
@@ -264,15 +274,20 @@ def _simplify(text: str) -> str:
 
 
 def _simplify_unit(unit: str) -> str:
-    return (
-        re.sub(r"[ ·*.⋅]", "", unit).replace("degrees", "deg").replace("degree", "deg")
-    )
+    symbol = re.sub(r"[ ·*.⋅]", "", unit)
+    return re.sub("degrees?", "deg", symbol)
 
 
 @dataclass(frozen=True)
 class _Header:
-    """A header of a table: `text`, the column's name as this module has it, None if it
-    is unknown, and the unit, None if none is stated."""
+    """A header of a table.
+
+    Attributes
+    ----------
+    text : the header itself.
+    name : name of the column in this module, None if it is unknown.
+    unit : None if none is stated.
+    """
 
     text: str
     name: str | None
@@ -282,7 +297,7 @@ class _Header:
 def find_columns(
     text: TextTable, mapped: Mapping[str, str], robot: Robot | None
 ) -> tuple[dict[str, str], dict[str, str]]:
-    """Find out what the columns of a table are.
+    """Find the columns of a table by their names.
 
     Parameters
     ----------
@@ -302,9 +317,12 @@ def find_columns(
     """
     for stated_header in mapped.values():
         if stated_header not in text.columns:
-            found = f"no column {stated_header!r}"
-            allowed = suggest_names(stated_header, list(text.columns))
-            raise InputError(text.path, "header", found, allowed)
+            raise InputError(
+                text.path,
+                "header",
+                f"no column {stated_header!r}",
+                suggest_names(stated_header, list(text.columns)),
+            )
     columns = dict(mapped)
     stated_units: dict[str, str] = {}
     for header in _recognize_headers(text, mapped, robot):
@@ -316,13 +334,16 @@ def find_columns(
         if columns.get(name, header.text) != header.text:
             raise _duplicate_error(text, name, columns[name], header.text)
         has_unit = header.unit not in (None, *_NO_UNIT)
-        if has_unit and name not in mapped and kind_of(name) == (NONE,):
-            found = f"{header.text!r}, a {name} with a unit"
-            allowed = (
-                f"--ignore {header.text!r}, --column {name}={header.text!r} where it"
-                f" numbers or names each {name}, or --column NAME=…"
+        if has_unit and name not in mapped and list_kinds(name) == (NONE,):
+            raise InputError(
+                text.path,
+                "header",
+                f"{header.text!r}, a {name} with a unit",
+                (
+                    f"--ignore {header.text!r}, --column {name}={header.text!r} where it"
+                    f" numbers or names each {name}, or --column NAME=…"
+                ),
             )
-            raise InputError(text.path, "header", found, allowed)
         columns[name] = header.text
         if header.unit is not None:
             stated_units[name] = header.unit
@@ -332,13 +353,14 @@ def find_columns(
 def _recognize_headers(
     text: TextTable, mapped: Mapping[str, str], robot: Robot | None
 ) -> Iterator[_Header]:
-    """Recognize each header: by an option, by the robot's joint names, or by what such
-    a column is usually called."""
+    """Recognize each header by an option, by the robot's joint names, or by its usual
+    names."""
     joint_names = (robot.joint_names if robot else None) or ()
     names_of_joints = {
         _simplify(joint_name): f"q{joint}"
         for joint, joint_name in enumerate(joint_names, 1)
     }
+    # If options give one header two names, the first counts.
     names_of_options = {header: name for name, header in reversed([*mapped.items()])}
     usual = {header: recognize_column(header) for header in text.columns}
     usual_names = {name for name, _ in usual.values()} | {*mapped}
@@ -357,12 +379,15 @@ def _recognize_headers(
 
 
 def choose_unit(text: TextTable, header: str, unit: str | None) -> str | None:
-    """Unit of a header, or of the row under it; refuse two different ones."""
+    """Choose the unit of a header or of the row under it; refuse two different ones."""
     unit_below = text.units.get(header)
     if unit and unit_below and unit != unit_below:
-        found = f"{header!r} and {unit_below!r} in the row under it"
-        allowed = f"one unit; --ignore {header!r}, or a table with one of them"
-        raise InputError(text.path, "header", found, allowed)
+        raise InputError(
+            text.path,
+            "header",
+            f"{header!r} and {unit_below!r} in the row under it",
+            f"one unit; --ignore {header!r}, or a table with one of them",
+        )
     return unit or unit_below
 
 
@@ -374,11 +399,14 @@ def _refuse_count_from_zero(
         return
     joint = _JOINT.fullmatch(_simplify(split_unit(header.text)[0]))
     if joint and int(joint[2]) == 0:
-        found = f"{header.text!r}, counted from 0"
-        allowed = (
-            f"--column q1={header.text!r} …, each joint's, or --ignore {header.text!r}"
+        raise InputError(
+            text.path,
+            "header",
+            f"{header.text!r}, counted from 0",
+            (
+                f"--column q1={header.text!r} …, each joint's, or --ignore {header.text!r}"
+            ),
         )
-        raise InputError(text.path, "header", found, allowed)
 
 
 def _duplicate_error(text: TextTable, name: str, first: str, second: str) -> InputError:
@@ -386,9 +414,9 @@ def _duplicate_error(text: TextTable, name: str, first: str, second: str) -> Inp
     quaternion = ""
     if name in ("q1", "q2", "q3", "q4"):
         quaternion = "; of a quaternion --column qw=NAME …"
-    found = f"both {first!r} and {second!r} for {name}"
+    problem = f"both {first!r} and {second!r} for {name}"
     allowed = f"--column {name}=NAME, or --ignore NAME{quaternion}"
-    return InputError(text.path, "header", found, allowed)
+    return InputError(text.path, "header", problem, allowed)
 
 
 def find_units(
@@ -399,119 +427,134 @@ def find_units(
     given: Mapping[str, str],
     robot: Robot | None = None,
 ) -> dict[str, str]:
-    """Units of wanted columns by their names: by options, by headers, or of what has a
-    usual unit that one.
+    """Find the units of columns: from options, from headers, or the usual ones.
 
-    `stated`: by headers. `given`: by options, ``angles`` and ``lengths`` for all that
-    have no other. Raises `InputError`: no unit, or one of another kind.
+    Parameters
+    ----------
+    text : the table
+    columns : headers by name
+    wanted : names of the columns whose units are needed
+    stated : units that headers state, by name
+    given : units that options state, by name; ``angles`` and ``lengths`` for all columns
+        that have no other unit
+    robot : robot whose prismatic joints report lengths
+
+    Raises
+    ------
+    InputError
+        A column has no unit, or one of another kind.
     """
-    found: dict[str, str] = {}
+    column_units: dict[str, str] = {}
     for name in wanted:
-        kinds = kind_of(name)
+        kinds = list_kinds(name)
         if robot and len(kinds) > 1:
             kinds = (LENGTH if robot.chain.prismatic[int(name[1:]) - 1] else ANGLE,)
         if kinds == (NONE,):
             continue
-        for_all = given.get("lengths" if kinds[0] == LENGTH else "angles")
-        # Options go before headers, those for one column before those for all.
-        unit = given.get(name) or stated.get(name) or _USUAL.get(kinds[0]) or for_all
+        is_length = kinds[0] == LENGTH
+        unit_of_all = given.get("lengths" if is_length else "angles")
+        # An option for this column precedes its header, and both precede an option for all
+        # columns.
+        unit = (
+            given.get(name) or stated.get(name) or _USUAL.get(kinds[0]) or unit_of_all
+        )
         if unit is None:
-            option = "--lengths mm" if kinds[0] == LENGTH else "--angles deg"
+            problem = f"no unit of {columns[name]!r}"
+            option = "--lengths mm" if is_length else "--angles deg"
             raise InputError(
-                text.path,
-                "header",
-                f"no unit of {columns[name]!r}",
-                f"{option} or such, or --unit {name}=UNIT",
+                text.path, "header", problem, f"{option} or such, or --unit {name}=UNIT"
             )
         if _scale(unit, kinds) is None:
+            key = f"unit of {columns[name]!r}"
             units = itertools.chain.from_iterable(UNITS[kind] for kind in kinds)
-            allowed = f"{', '.join(units)}, by --unit {name}=UNIT"
             raise InputError(
-                text.path, f"unit of {columns[name]!r}", repr(unit), allowed
+                text.path, key, repr(unit), f"{', '.join(units)}, by --unit {name}=UNIT"
             )
-        found[name] = unit
-    return found
+        column_units[name] = unit
+    return column_units
 
 
-def columns_of_rotation(notation: str, there: Collection[str]) -> tuple[str, ...]:
-    """Names of the columns of an orientation in a notation.
+def list_rotation_columns(notation: str, names: Collection[str]) -> tuple[str, ...]:
+    """List the names of the columns of an orientation in a notation.
 
-    `there`: columns that a table has: Euler angles about three different axes may be
-    named after the axes, ``rx``, or ``e1..e3``.
+    Euler angles about three different axes may be named after the axes, such as ``rx``, if
+    the table has columns of these `names`; otherwise they are ``e1..e3``.
     """
     if not notation.startswith(EULER_ANGLES):
         return _NOTATIONS[notation]
     axes = notation.removeprefix(EULER_ANGLES).lower()
     by_axis = tuple(f"r{axis}" for axis in axes)
-    return (
-        by_axis
-        if len(set(axes)) == 3 and all(name in there for name in by_axis)
-        else EULER
-    )
+    if len(set(axes)) == 3 and set(by_axis) <= set(names):
+        return by_axis
+    return EULER
 
 
 def find_rotation(
     text: TextTable, columns: Mapping[str, str], notation: str | None
 ) -> str:
-    """Notation of the orientations of a table: the one that is stated, or the one that
-    the names of columns leave.
+    """Find the notation of the orientations of a table: the stated one, or the only one
+    that fits the columns.
 
-    `columns`: headers by name. Raises `InputError` where it is ambiguous.
+    `columns` are headers by name. Raises `InputError` if the notation is ambiguous.
     """
     if notation is not None:
-        axes = notation.removeprefix(EULER_ANGLES)
-        turns = re.fullmatch(r"[XYZ]{3}|[xyz]{3}", axes) and all(
-            one != other for one, other in itertools.pairwise(axes)
-        )
-        if not (turns if axes != notation else notation in _NOTATIONS):
+        if notation not in _NOTATIONS and not _EULER_NOTATION.fullmatch(notation):
             raise InputError("--rotation", "", repr(notation), _ALLOWED)
         return notation
     for certain in _CERTAIN:
         if all(name in columns for name in _NOTATIONS[certain]):
             return certain
-    if part := [columns[name] for name in QUATERNION if name in columns]:
-        allowed = "--column qw=NAME and such for what is missing, or --rotation none"
+    components = [columns[name] for name in QUATERNION if name in columns]
+    if components:
         raise InputError(
-            text.path, "header", f"a part of a quaternion, {', '.join(part)}", allowed
+            text.path,
+            "header",
+            f"a part of a quaternion, {', '.join(components)}",
+            "--column qw=NAME and such for what is missing, or --rotation none",
         )
-    if angles := [columns[name] for name in (*VECTOR, *EULER) if name in columns]:
-        allowed = f"--rotation vector, euler:ZYX, euler:xyz … or none: {_ALLOWED}"
+    angles = [columns[name] for name in (*VECTOR, *EULER) if name in columns]
+    if angles:
         raise InputError(
             text.path,
             "header",
             f"orientations {', '.join(angles)} of an unknown notation",
-            allowed,
+            f"--rotation vector, euler:ZYX, euler:xyz … or none: {_ALLOWED}",
         )
     return NO_ROTATION
 
 
-def rotation_vectors(
+def convert_to_rotation_vectors(
     notation: str, values: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation vectors of orientations in a notation that is not "none".
+    """Convert orientations in a notation other than "none" to rotation vectors.
 
-    `values` (N, columns): in the order of `columns_of_rotation`; angles in rad. Of
-    homogeneous matrices the translations are left aside. Returns `vectors` (N, 3): rad;
-    `off` (N,) of bool: whether a quaternion is not of length one or a matrix not a
-    rotation, more than rounding to four digits explains.
+    Parameters
+    ----------
+    notation : notation of the orientations
+    values : (N, columns), in the order of `list_rotation_columns`; angles in rad. The
+        translations of homogeneous matrices are not used.
+
+    Returns
+    -------
+    vectors : (N, 3), rad.
+    is_wrong : (N,) bool array, whether the length of a quaternion differs from one, or a
+        matrix from a rotation, by more than rounding to four digits explains.
     """
-    off = np.zeros(len(values), bool)
+    is_wrong = np.zeros(len(values), bool)
     if notation == "vector":
-        return values, off
+        return values, is_wrong
     if notation.startswith(EULER_ANGLES):
-        return Rotation.from_euler(
-            notation.removeprefix(EULER_ANGLES), values
-        ).as_rotvec(), off
-    if notation == QUATERNIONS:
-        off = np.abs(np.linalg.norm(values, axis=1) - 1.0) > UNIT_LENGTH
-        safe = np.where(off[:, None], [1.0, 0.0, 0.0, 0.0], values)
-        return Rotation.from_quat(safe, scalar_first=True).as_rotvec(), off
-    matrices = values.reshape(len(values), 3, -1)[:, :, :3]
-    off = (
-        np.abs(np.swapaxes(matrices, 1, 2) @ matrices - np.eye(3)).max(axis=(1, 2))
-        > UNIT_LENGTH
-    )
-    off |= np.linalg.det(matrices) < 0.0
-    return Rotation.from_matrix(
-        np.where(off[:, None, None], np.eye(3), matrices)
-    ).as_rotvec(), off
+        rotation = Rotation.from_euler(notation.removeprefix(EULER_ANGLES), values)
+    elif notation == QUATERNIONS:
+        is_wrong = np.abs(np.linalg.norm(values, axis=1) - 1.0) > UNIT_LENGTH
+        quaternions = np.where(is_wrong[:, None], [1.0, 0.0, 0.0, 0.0], values)
+        rotation = Rotation.from_quat(quaternions, scalar_first=True)
+    else:
+        matrices = values.reshape(len(values), 3, -1)[:, :, :3]
+        products = np.swapaxes(matrices, 1, 2) @ matrices
+        is_wrong = np.abs(products - np.eye(3)).max(axis=(1, 2)) > UNIT_LENGTH
+        is_wrong |= np.linalg.det(matrices) < 0.0
+        rotation = Rotation.from_matrix(
+            np.where(is_wrong[:, None, None], np.eye(3), matrices)
+        )
+    return rotation.as_rotvec(), is_wrong

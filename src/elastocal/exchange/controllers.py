@@ -1,7 +1,7 @@
-"""Programs with joint targets in the languages of robot controllers: `CONTROLLERS`, one
-entry each.
+"""Programs with joint targets in the languages of robot controllers; `CONTROLLERS` has one
+entry for each language.
 
-Each program goes to all targets, slowly. After: KUKA System Software 8.3, Operating and
+Each program moves slowly to all targets. References: KUKA System Software 8.3, Operating and
 Programming Instructions for System Integrators (PTP to axis positions); ABB, Technical
 reference manual: RAPID Instructions, 3HAC050917 (MoveAbsJ, jointtarget); FANUC, R-30iB
 Plus Operator's Manual, B-83284EN (joint positions, ASCII upload); Universal Robots, The
@@ -23,35 +23,46 @@ from elastocal.io import plugins
 
 @dataclass(frozen=True)
 class JointTargets:
-    """Targets (N, n) in degrees, of prismatic joints in mm, by the controller's names
-    of the axes, with their ``units``."""
+    """Joint targets in the units of controllers.
+
+    Attributes
+    ----------
+    axes : the controller's names of the joints.
+    units : unit of each joint, "deg" or "mm".
+    values : targets, (N, n), in deg, and in mm for prismatic joints.
+    """
 
     axes: tuple[str, ...]
     units: tuple[str, ...]
     values: np.ndarray
 
     def rows(self, names: Sequence[str]) -> list[list[str | None]]:
-        """Numbers as all controllers read them, target for target, of these axes; None
-        of one that the robot does not have."""
-        return [
-            [texts.get(name) for name in names]
-            for texts in map(self._format_target, self.values)
-        ]
-
-    def _format_target(self, values: np.ndarray) -> dict[str, str]:
-        """Numbers of one target (n,) by axis. Adding zero removes the minus sign of a
-        zero."""
-        texts = [f"{round(value, 6) + 0.0:.6f}" for value in values]
-        return dict(zip(self.axes, texts, strict=True))
+        """Format the numbers of these axes, target by target; None for an axis that the
+        robot does not have."""
+        rows = []
+        for values in self.values:
+            # Adding zero removes the minus sign of a zero.
+            texts = [f"{round(value, 6) + 0.0:.6f}" for value in values]
+            text_by_axis = dict(zip(self.axes, texts, strict=True))
+            rows.append([text_by_axis.get(name) for name in names])
+        return rows
 
 
 @dataclass(frozen=True)
 class Controller:
-    """A language: `words` as a person calls it, `suffix` of its files, what it calls
-    the axes of the robot and those beside.
+    """The language of a robot controller.
 
-    `pattern`, `pattern_words`: of names of programs. `write`: the text of a program
-    from its name, targets and notes; `remarks` makes these comments.
+    Attributes
+    ----------
+    name : name in options.
+    words : name in sentences.
+    suffix : suffix of its files.
+    axes : its names of the robot's axes.
+    external : its names of external axes.
+    pattern, pattern_words : regular expression of the names of programs, and the same in
+        words.
+    write : makes the lines of a program from its name, targets and notes, which
+        `format_remarks` turns into comments.
     """
 
     name: str
@@ -66,31 +77,23 @@ class Controller:
     def program(
         self, name: str, targets: JointTargets, notes: Sequence[str] = ()
     ) -> str:
-        """The text of the file; the name is one that `check_name` allows."""
+        """Format the text of a file; `check_name` has checked the name."""
         return "\n".join([*self.write(name, targets, notes), ""])
 
 
-def remarks(
+def format_remarks(
     notes: Sequence[str], mark: str, longest: int = 100, end: str = ""
 ) -> list[str]:
-    """Lines of comments with notes of any text, each behind the language's mark: no
-    note is more than a comment.
+    """Format notes as lines of comments, each after the language's mark.
 
-    What no controller takes for a sign of its language is kept: letters and digits of
-    ASCII, blanks and ``. , : _ + - / ( )``.
+    Only characters that no controller reads as syntax are kept: letters and digits of
+    ASCII, blanks and ``. , : _ + - / ( )``. All others become question marks.
     """
-    plain = [
-        "".join(
-            c if c.isascii() and (c.isalnum() or c in " .,:_+-/()") else "?"
-            for c in format_printable(note)
-        )
-        for note in notes
-    ]
-    return [
-        f"{mark}{piece}{end}"
-        for note in plain
-        for piece in textwrap.wrap(note, longest)
-    ]
+    lines = []
+    for note in notes:
+        plain = re.sub(r"[^A-Za-z0-9 .,:_+\-/()]", "?", format_printable(note))
+        lines += [f"{mark}{text}{end}" for text in textwrap.wrap(plain, longest)]
+    return lines
 
 
 def _krl(name: str, targets: JointTargets, notes: Sequence[str]) -> list[str]:
@@ -99,7 +102,7 @@ def _krl(name: str, targets: JointTargets, notes: Sequence[str]) -> list[str]:
         "&ACCESS RVP",
         f"DEF {name}()",
         "  ; joint targets corrected by elastocal, degrees and mm",
-        *remarks(notes, "  ; - "),
+        *format_remarks(notes, "  ; - "),
     ]
     lines += [
         "  INT i",
@@ -116,18 +119,18 @@ def _krl(name: str, targets: JointTargets, notes: Sequence[str]) -> list[str]:
 
 
 def _rapid(name: str, targets: JointTargets, notes: Sequence[str]) -> list[str]:
-    """A module with the targets, and a procedure that goes to all of them with a tool
-    of the caller's."""
+    """A module with the targets, and a procedure that moves to all of them with the tool
+    of the caller."""
     rows = targets.rows((*_RAPID_AXES, *_RAPID_EXTERNAL))
     lines = [
         f"MODULE {name}",
         "  ! joint targets corrected by elastocal, degrees and mm",
-        *remarks(notes, "  ! "),
+        *format_remarks(notes, "  ! "),
     ]
     for number, row in enumerate(rows, 1):
-        own = ",".join(value or "0" for value in row[:6])
-        beside = ",".join(value or "9E9" for value in row[6:])
-        lines.append(f"  CONST jointtarget target_{number} := [[{own}],[{beside}]];")
+        axes = ",".join(value or "0" for value in row[:6])
+        external = ",".join(value or "9E9" for value in row[6:])
+        lines.append(f"  CONST jointtarget target_{number} := [[{axes}],[{external}]];")
     lines += ["", "  PROC go_to_targets(PERS tooldata used_tool)"]
     lines += [
         f"    MoveAbsJ target_{number}, v100, fine, used_tool;"
@@ -137,8 +140,8 @@ def _rapid(name: str, targets: JointTargets, notes: Sequence[str]) -> list[str]:
 
 
 def _tp(name: str, targets: JointTargets, notes: Sequence[str]) -> list[str]:
-    """A program of group 1, of which extended axes are too; three axes a line, remarks
-    of 32 characters."""
+    """A program of group 1, which includes extended axes, with three axes on a line and
+    remarks of 32 characters."""
     names = [axis for axis in (*_TP_AXES, *_TP_EXTERNAL) if axis in targets.axes]
     units = dict(zip(targets.axes, targets.units, strict=True))
     rows = targets.rows(names)
@@ -149,27 +152,31 @@ def _tp(name: str, targets: JointTargets, notes: Sequence[str]) -> list[str]:
         "DEFAULT_GROUP\t= 1,*,*,*,*;",
         "/MN",
     ]
-    inside = [
-        *remarks(notes, "  !", 32, " ;"),
+    instructions = [
+        *format_remarks(notes, "  !", 32, " ;"),
         *(f"J P[{number}] 10% FINE    ;" for number in range(1, len(rows) + 1)),
     ]
     lines += [
-        *(f"{number:4d}:{instruction}" for number, instruction in enumerate(inside, 1)),
+        *(
+            f"{number:4d}:{instruction}"
+            for number, instruction in enumerate(instructions, 1)
+        ),
         "/POS",
     ]
     for number, row in enumerate(rows, 1):
-        words = [
+        positions = [
             f"{axis}= {value} {units[axis]}"
             for axis, value in zip(names, row, strict=True)
         ]
-        inside = [
-            ",\t".join(words[first : first + 3]) for first in range(0, len(words), 3)
+        position_lines = [
+            ",\t".join(positions[first : first + 3])
+            for first in range(0, len(positions), 3)
         ]
         lines += [
             f"P[{number}]{{",
             "   GP1:",
             "\tUF : 0, UT : 1,\t",
-            "\t" + ",\n\t".join(inside),
+            "\t" + ",\n\t".join(position_lines),
             "};",
         ]
     return [*lines, "/END"]
@@ -180,7 +187,7 @@ def _urscript(name: str, targets: JointTargets, notes: Sequence[str]) -> list[st
     lines = [
         f"def {name}():",
         "  # joint targets corrected by elastocal, rad",
-        *remarks(notes, "  # "),
+        *format_remarks(notes, "  # "),
     ]
     for row in np.radians(targets.values[:, order]):
         position = ", ".join(f"{round(value, 9) + 0.0:.9f}" for value in row)
@@ -240,14 +247,14 @@ CONTROLLERS = {controller.name: controller for controller in _CONTROLLERS}
 
 
 def list_controllers() -> dict[str, Controller]:
-    """Languages of this package, and those that installed packages offer, by name."""
+    """List the languages of this package and of other installed packages, by name."""
     return CONTROLLERS | plugins.load_plugins(
         plugins.CONTROLLERS, Controller, CONTROLLERS
     )
 
 
 def find_controller(name: str) -> Controller:
-    """Find a language by its name; `InputError`: there is no such language."""
+    """Find a language by its name; raises `InputError` if there is none."""
     if name in CONTROLLERS:
         return CONTROLLERS[name]
     controllers = list_controllers()
@@ -257,21 +264,20 @@ def find_controller(name: str) -> Controller:
 
 
 def check_name(controller: Controller, path: Path) -> str:
-    """The name of the program in a file: the file's without its suffix, which an
-    InputError refuses where it is none."""
+    """Return the name of a program, which is that of its file without the suffix; refuse
+    one that the language does not allow."""
     name = path.stem
     if not re.fullmatch(controller.pattern, name, re.ASCII):
-        found = f"{name!r} as the name of a program"
         raise InputError(
             path,
             "--output",
-            found,
+            f"{name!r} as the name of a program",
             f"in {controller.words}: {controller.pattern_words}",
         )
     return name
 
 
-def axes_of(
+def find_axes(
     controller: Controller, prismatic: Sequence[bool], stated: str
 ) -> tuple[str, ...]:
     """Find the controller's names of q1, q2, ...
@@ -280,29 +286,33 @@ def axes_of(
     external axes. For other robots the names must be `stated`, as ``A1,A2,...``: the
     third of seven joints may be an external axis, and a palletizer has four of six.
     """
-    known = (*controller.axes, *controller.external)
+    all_axes = (*controller.axes, *controller.external)
     joints = f"q1 to q{len(prismatic)}"
     if stated:
         names = tuple(name.strip() for name in stated.split(","))
         is_complete = len(names) == len(set(names)) == len(prismatic)
-        if not is_complete or not set(names) <= set(known):
+        if not is_complete or not set(names) <= set(all_axes):
             count = format_count(len(prismatic), "different name")
-            allowed = f"{count}, of {joints}, of {', '.join(known)}"
-            raise InputError("--axes", "", repr(stated), allowed)
+            raise InputError(
+                "--axes",
+                "",
+                repr(stated),
+                f"{count}, of {joints}, of {', '.join(all_axes)}",
+            )
         return names
     shifts = sum(prismatic)
     turns = len(prismatic) - shifts
     if turns != len(controller.axes) or shifts > len(controller.external):
-        found = f"{_count_revolute(turns)} and {shifts} that shift"
+        problem = f"{_count_revolute(turns)} and {shifts} that shift"
         if controller.external:
             allowed = (
                 f"--axes with what {controller.words} calls each of {joints}:"
-                f" {', '.join(known)}"
+                f" {', '.join(all_axes)}"
             )
         else:
             count = _count_revolute(len(controller.axes))
             allowed = f"{count}, which is all that {controller.words} has"
-        raise InputError("--format", controller.name, found, allowed)
+        raise InputError("--format", controller.name, problem, allowed)
     robot_axes = iter(controller.axes)
     external_axes = iter(controller.external)
     return tuple(
@@ -315,11 +325,10 @@ def _count_revolute(count: int) -> str:
     return format_count(count, "joint that turns", "joints that turn")
 
 
-def targets_of(
+def build_targets(
     joint_angles: np.ndarray, prismatic: Sequence[bool], axes: tuple[str, ...]
 ) -> JointTargets:
-    """Targets of joint angles (N, n) in rad and, of prismatic joints, m."""
+    """Make targets of joint angles (N, n) in rad, and in m for prismatic joints."""
     values = np.where(prismatic, 1e3 * joint_angles, np.degrees(joint_angles))
-    return JointTargets(
-        axes, tuple("mm" if shift else "deg" for shift in prismatic), values
-    )
+    units = tuple("mm" if is_prismatic else "deg" for is_prismatic in prismatic)
+    return JointTargets(axes, units, values)

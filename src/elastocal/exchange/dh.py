@@ -54,7 +54,7 @@ from elastocal.exchange.robot_text import (
     check_imported,
     format_displacement,
     format_point_name,
-    format_words,
+    format_tokens,
     make_elementary_transform,
     make_origin_transform,
 )
@@ -158,8 +158,12 @@ def robot_from_dh(
             ("--ignore", options.ignore),
         ):
             if is_given:
-                found = f"a file of {_KINEMATICS}, which is no table"
-                raise InputError(option, "", found, f"the file without {option}")
+                raise InputError(
+                    option,
+                    "",
+                    f"a file of {_KINEMATICS}, which is no table",
+                    f"the file without {option}",
+                )
         return _robot_from_kinematics(path, name)
     table = _read_table(path, options)
     document: dict[str, Any] = {"name": name}
@@ -168,30 +172,34 @@ def robot_from_dh(
     if not all(joint_name.isdecimal() for joint_name in names) and any(names):
         for joint_name in names:
             if not joint_name or names.count(joint_name) > 1:
-                allowed = "a name for every joint, each once"
-                raise InputError(source, "column joint", repr(joint_name), allowed)
+                raise InputError(
+                    source,
+                    "column joint",
+                    repr(joint_name),
+                    "a name for every joint, each once",
+                )
         document["joint_names"] = names
-    words = _format_rows(table.rows, modified=modified)
-    short_words = _format_short_chain(table.rows, modified=modified)
-    length = _sum_lengths(words)
-    short_length = _sum_lengths(short_words)
+    tokens = _format_rows(table.rows, modified=modified)
+    short_tokens = _format_short_chain(table.rows, modified=modified)
+    length = _sum_lengths(tokens)
+    short_length = _sum_lengths(short_tokens)
     notes = [*table.notes, *_LACKS]
     if short_length < _MUCH_SHORTER * length:
-        words = short_words
+        tokens = short_tokens
         notes.append(
             f"lengths of {length:.4g} m that cancel along nearly parallel axes became"
             f" {short_length:.4g} m in the chain, whose joints are at other places of"
             " the same axes: the pose at the end is the same"
         )
-    document["chain"] = " ".join([*words, "[flange]"])
+    document["chain"] = " ".join([*tokens, "[flange]"])
     notation = "modified" if modified else "standard"
     description = f"{notation} Denavit-Hartenberg parameters"
     return check_imported(document, path, description, notes)
 
 
-def _sum_lengths(words: list[str]) -> float:
+def _sum_lengths(tokens: list[str]) -> float:
     """Sum the lengths of the shifts in a chain, m."""
-    shifts = (_SHIFT.fullmatch(word) for word in words)
+    shifts = (_SHIFT.fullmatch(token) for token in tokens)
     return sum(abs(float(shift[1])) for shift in shifts if shift)
 
 
@@ -200,8 +208,12 @@ def _read_table(path: str | Path, options: DhOptions) -> _DhTable:
     source = Path(path).as_posix()
     suffix = Path(path).suffix
     if suffix.lower() != ".csv":
-        found = f"a file that ends in {suffix!r}"
-        raise InputError(source, "", found, f".csv, or .yaml with {_KINEMATICS}")
+        raise InputError(
+            source,
+            "",
+            f"a file that ends in {suffix!r}",
+            f".csv, or .yaml with {_KINEMATICS}",
+        )
     text = read_text_table(
         path,
         lambda cells: any(split_unit(cell)[0] in _NEEDED for cell in cells),
@@ -212,9 +224,12 @@ def _read_table(path: str | Path, options: DhOptions) -> _DhTable:
     )
     headers, units = _find_columns(text, options)
     if len(text.lines) > _MOST_ROWS:
-        found = format_count(len(text.lines), "row")
-        allowed = f"at most {_MOST_ROWS}, one for each joint"
-        raise InputError(source, "", found, allowed)
+        raise InputError(
+            source,
+            "",
+            format_count(len(text.lines), "row"),
+            f"at most {_MOST_ROWS}, one for each joint",
+        )
     scales = {name: UNITS[_KINDS[name]][unit] for name, unit in units.items()}
     cells = text.cells(headers, scales)
     if "type" in headers:
@@ -243,8 +258,12 @@ def _find_columns(
         name, stated = (header, None) if header in _WITHOUT_UNIT else split_unit(header)
         if name not in (*_KINDS, *_WITHOUT_UNIT):
             suggestion = suggest_names(header, _USUAL)
-            allowed = f"{suggestion}; import dh --ignore {header!r} leaves it out"
-            raise InputError(text.path, "header", repr(header), allowed)
+            raise InputError(
+                text.path,
+                "header",
+                repr(header),
+                f"{suggestion}; import dh --ignore {header!r} leaves it out",
+            )
         if name in headers:
             raise InputError(text.path, "header", f"{name} twice", "each column once")
         headers[name] = header
@@ -253,8 +272,12 @@ def _find_columns(
             units[name] = _check_unit(text, header, _KINDS[name], unit, options)
     for name in _NEEDED:
         if name not in headers:
-            allowed = "theta_offset, d, a and alpha, such as d_m or d_mm"
-            raise InputError(text.path, "header", f"no column {name}", allowed)
+            raise InputError(
+                text.path,
+                "header",
+                f"no column {name}",
+                "theta_offset, d, a and alpha, such as d_m or d_mm",
+            )
     return headers, units
 
 
@@ -266,10 +289,14 @@ def _check_unit(
     unit = unit or (options.angles if kind == ANGLE else options.lengths)
     if unit in UNITS[kind]:
         return unit
-    found = f"{header!r} in {unit}" if unit else f"no unit of {header!r}"
+    problem = f"{header!r} in {unit}" if unit else f"no unit of {header!r}"
     option = "--angles deg" if kind == ANGLE else "--lengths mm"
-    allowed = f"{option} or such, or {', '.join(UNITS[kind])} behind the name"
-    raise InputError(text.path, "header", found, allowed)
+    raise InputError(
+        text.path,
+        "header",
+        problem,
+        f"{option} or such, or {', '.join(UNITS[kind])} behind the name",
+    )
 
 
 def _check_angles(cells: Cells, name: str, values: np.ndarray, unit: str) -> None:
@@ -323,12 +350,12 @@ def _split_rows(rows: np.ndarray, *, modified: bool) -> Iterator[_DhRow]:
 
 def _format_rows(rows: np.ndarray, *, modified: bool) -> list[str]:
     """Format a table in the chain notation, row by row."""
-    words: list[str] = []
+    tokens: list[str] = []
     for joint, row in enumerate(_split_rows(rows, modified=modified), 1):
-        words += format_words(row.before)
-        words.append(f"Rz(q{joint})")
-        words += format_words(row.behind)
-    return words
+        tokens += format_tokens(row.before)
+        tokens.append(f"Rz(q{joint})")
+        tokens += format_tokens(row.behind)
+    return tokens
 
 
 def _format_short_chain(rows: np.ndarray, *, modified: bool) -> list[str]:
@@ -339,16 +366,16 @@ def _format_short_chain(rows: np.ndarray, *, modified: bool) -> list[str]:
     for row in _split_rows(rows, modified=modified):
         fixed[-1] = fixed[-1] @ _multiply(row.before)
         fixed.append(_multiply(row.behind))
-    words: list[str] = []
+    tokens: list[str] = []
     slide = 0.0
     for joint, transform in enumerate(fixed[:-1], 1):
         transform = make_elementary_transform("T", 2, -slide) @ transform
         # Take the point of the next axis that is closest to the current origin.
         slide = -float(transform[:3, 2] @ transform[:3, 3])
         transform = transform @ make_elementary_transform("T", 2, slide)
-        words += [*format_displacement(transform), f"Rz(q{joint})"]
+        tokens += [*format_displacement(transform), f"Rz(q{joint})"]
     last = make_elementary_transform("T", 2, -slide) @ fixed[-1]
-    return [*words, *format_displacement(last)]
+    return [*tokens, *format_displacement(last)]
 
 
 def _multiply(transforms: Iterable[tuple[str, float]]) -> np.ndarray:
@@ -366,20 +393,20 @@ def _robot_from_kinematics(path: str | Path, name: str) -> ImportedRobot:
     """Import the robot of a kinematics file, its links in the order of the arm."""
     source = Path(path).as_posix()
     links, has_digest = _read_links(path)
-    words: list[str] = []
+    tokens: list[str] = []
     joint_names = []
     understood = []
     for joint, (link, origin) in enumerate(links.items(), 1):
         values = _read_origin(origin, source, f"{_KINEMATICS}.{link}")
-        words += format_displacement(make_origin_transform(values[:3], values[3:]))
-        words.append(f"Rz(q{joint})")
+        tokens += format_displacement(make_origin_transform(values[:3], values[3:]))
+        tokens.append(f"Rz(q{joint})")
         joint_name = _JOINTS.get(link, link)
         joint_names.append(joint_name)
         understood.append(f"q{joint} is {joint_name} of {link!r}")
     document = {
         "name": name,
         "joint_names": joint_names,
-        "chain": " ".join([*words, f"[{format_point_name([*links][-1])}]"]),
+        "chain": " ".join([*tokens, f"[{format_point_name([*links][-1])}]"]),
     }
     notes = [f"read: {', '.join(understood)}"]
     if has_digest:
@@ -398,8 +425,12 @@ def _read_links(path: str | Path) -> tuple[dict[str, Any], bool]:
     source = Path(path).as_posix()
     document = read_document(path)
     if not isinstance(document, dict) or _KINEMATICS not in document:
-        allowed = f"{_KINEMATICS} as ROS drivers write them, or a table as .csv"
-        raise InputError(source, "", f"no {_KINEMATICS}", allowed)
+        raise InputError(
+            source,
+            "",
+            f"no {_KINEMATICS}",
+            f"{_KINEMATICS} as ROS drivers write them, or a table as .csv",
+        )
     entries = document[_KINEMATICS]
     allowed = f"links, each with {', '.join(_KEYS)}"
     if not isinstance(entries, dict):
@@ -412,8 +443,12 @@ def _read_links(path: str | Path) -> tuple[dict[str, Any], bool]:
         in_order = [link for link in _JOINTS if link in links]
         for link, expected in zip(in_order, _JOINTS, strict=False):
             if link != expected:
-                allowed = f"every link before {in_order[-1]}"
-                raise InputError(source, _KINEMATICS, f"no link {expected}", allowed)
+                raise InputError(
+                    source,
+                    _KINEMATICS,
+                    f"no link {expected}",
+                    f"every link before {in_order[-1]}",
+                )
         links = {link: links[link] for link in in_order}
     return links, "hash" in entries
 
@@ -423,13 +458,15 @@ def _read_origin(origin: object, source: str, key: str) -> list[float]:
     if not isinstance(origin, dict):
         raise InputError(source, key, type(origin).__name__, ", ".join(_KEYS))
     if set(origin) != set(_KEYS):
-        found = ", ".join(map(str, origin)) or "nothing"
-        raise InputError(source, key, found, ", ".join(_KEYS))
+        raise InputError(
+            source, key, ", ".join(map(str, origin)) or "nothing", ", ".join(_KEYS)
+        )
     values = []
     for name in _KEYS:
         value = parse_number(str(origin[name]))
         if value is None:
-            found = repr(origin[name])
-            raise InputError(source, f"{key}.{name}", found, NUMBER_ALLOWED)
+            raise InputError(
+                source, f"{key}.{name}", repr(origin[name]), NUMBER_ALLOWED
+            )
         values.append(value)
     return values

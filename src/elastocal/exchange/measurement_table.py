@@ -29,18 +29,18 @@ from elastocal.exchange.column_names import (
     QUATERNIONS,
     TRANSLATION,
     VECTOR,
-    columns_of_rotation,
+    convert_to_rotation_vectors,
     find_columns,
     find_joints,
+    find_lengths,
     find_rotation,
+    find_scales,
     find_units,
     has_position,
     is_name,
-    lengths_in,
+    list_rotation_columns,
     read_units,
     recognize_column,
-    rotation_vectors,
-    scales_of,
 )
 from elastocal.io.texts import parse_number
 from elastocal.mechanics.components import WRENCH_NAMES
@@ -137,7 +137,7 @@ class _Layout:
 
     @property
     def orientation(self) -> tuple[str, ...]:
-        return columns_of_rotation(self.rotation, self.columns)
+        return list_rotation_columns(self.rotation, self.columns)
 
     @property
     def wrench(self) -> list[str]:
@@ -203,7 +203,7 @@ def read_measurement_table(
     )
     rows = _find_filled_rows(layout, skip_empty=options.skip_empty)
     optional = _read_optional_columns(layout, headers, options, rows)
-    cells = text.cells(layout.columns, scales_of(units), rows)
+    cells = text.cells(layout.columns, find_scales(units), rows)
     table = _read_columns(cells, layout, options) | optional.columns
     table |= {
         name: cells.numbers(name)
@@ -242,8 +242,8 @@ def _check_names(options: ImportOptions) -> None:
     names = [*options.columns, *(set(options.units) - {"angles", "lengths"})]
     for name in names:
         if not is_name(name):
-            known = [*describe_columns(6), "qw", "e1", "r11", "t11"]
-            raise InputError("--column", "", repr(name), suggest_names(name, known))
+            examples = [*describe_columns(6), "qw", "e1", "r11", "t11"]
+            raise InputError("--column", "", repr(name), suggest_names(name, examples))
 
 
 def _read_cells(path: str | Path, options: ImportOptions) -> TextTable:
@@ -306,15 +306,23 @@ def _check_target_headers(
     for name, headers in targets.items():
         for header, axis in zip(headers, POSITION, strict=True):
             if header not in text.columns:
-                allowed = f"{axis} of {name}: {', '.join(text.columns)}"
-                raise InputError(text.path, "header", f"no column {header!r}", allowed)
+                raise InputError(
+                    text.path,
+                    "header",
+                    f"no column {header!r}",
+                    f"{axis} of {name}: {', '.join(text.columns)}",
+                )
     for headers in zip(*targets.values(), strict=True):
         units = {
             text.units.get(header) or recognize_column(header)[1] for header in headers
         }
         if len(units) > 1:
-            found = "positions of targets in several units"
-            raise InputError(text.path, "header", found, "one unit for all targets")
+            raise InputError(
+                text.path,
+                "header",
+                "positions of targets in several units",
+                "one unit for all targets",
+            )
 
 
 def _find_layout(
@@ -327,14 +335,17 @@ def _find_layout(
     name."""
     columns, stated_units = find_columns(text, headers, robot)
     if find_joints(columns) and not has_position(columns):
-        lengths = lengths_in(text.columns)
+        lengths = find_lengths(text.columns)
         if lengths:
-            found = f"{', '.join(map(repr, lengths))} and no position"
-            allowed = (
-                "columns x, y, z of a point; distances alone, as of a draw wire or a"
-                " ball bar, cannot be used yet"
+            raise InputError(
+                text.path,
+                "header",
+                f"{', '.join(map(repr, lengths))} and no position",
+                (
+                    "columns x, y, z of a point; distances alone, as of a draw wire or a"
+                    " ball bar, cannot be used yet"
+                ),
             )
-            raise InputError(text.path, "header", found, allowed)
     rotation = find_rotation(text, columns, options.rotation)
     layout = _Layout(text, columns, stated_units, rotation)
     _check_complete(layout, robot)
@@ -355,26 +366,34 @@ def _check_complete(layout: _Layout, robot: Robot | None) -> None:
         joint_names = ""
         if robot and robot.joint_names:
             joint_names = f" or as the robot has them: {', '.join(robot.joint_names)}"
-        allowed = (
-            f"columns q1, q2 …{joint_names}, --column q1=NAME, or --robot FILE with"
-            f" joint_names; {unused}"
+        raise InputError(
+            path,
+            "header",
+            "no joint angles",
+            (
+                f"columns q1, q2 …{joint_names}, --column q1=NAME, or --robot FILE with"
+                f" joint_names; {unused}"
+            ),
         )
-        raise InputError(path, "header", "no joint angles", allowed)
     if robot and len(angles) > robot.joints:
         headers = ", ".join(columns[name] for name in angles)
-        found = f"{format_count(len(angles), 'joint')}: {headers}"
-        allowed = (
-            f"{robot.joints}, as {robot.name} has; --ignore NAME leaves a column out"
+        raise InputError(
+            path,
+            "header",
+            f"{format_count(len(angles), 'joint')}: {headers}",
+            (f"{robot.joints}, as {robot.name} has; --ignore NAME leaves a column out"),
         )
-        raise InputError(path, "header", found, allowed)
     joints = robot.joints if robot else int(angles[-1][1:])
     all_angles = [f"q{joint}" for joint in range(1, joints + 1)]
     for needed in (all_angles, [*layout.position, *layout.orientation]):
         missing = [name for name in needed if name not in columns]
         if missing:
-            found = f"no column {', '.join(missing)}"
-            allowed = f"--column {missing[0]}=NAME; {unused}"
-            raise InputError(path, "header", found, allowed)
+            raise InputError(
+                path,
+                "header",
+                f"no column {', '.join(missing)}",
+                f"--column {missing[0]}=NAME; {unused}",
+            )
 
 
 def _find_filled_rows(layout: _Layout, *, skip_empty: bool) -> np.ndarray:
@@ -394,13 +413,16 @@ def _find_filled_rows(layout: _Layout, *, skip_empty: bool) -> np.ndarray:
         target = ""
         if "target" in columns:
             target = f" of {text.columns[columns['target']][row]}"
-        allowed = "three numbers, or --skip-empty to leave such rows out"
         raise InputError(
-            text.path, f"line {text.lines[row]}", f"no position{target}", allowed
+            text.path,
+            f"line {text.lines[row]}",
+            f"no position{target}",
+            "three numbers, or --skip-empty to leave such rows out",
         )
     if not filled.any():
-        found = "no position in any row"
-        raise InputError(text.path, "", found, "at least one measurement")
+        raise InputError(
+            text.path, "", "no position in any row", "at least one measurement"
+        )
     return np.flatnonzero(filled)
 
 
@@ -430,7 +452,7 @@ def _read_columns(
 def _read_rotation_vectors(cells: Cells, layout: _Layout) -> np.ndarray:
     """Read the orientations as rotation vectors, ndarray (N, 3), rad."""
     values = cells.matrix(layout.orientation)
-    vectors, is_wrong = rotation_vectors(layout.rotation, values)
+    vectors, is_wrong = convert_to_rotation_vectors(layout.rotation, values)
     if is_wrong.any():
         allowed = "a rotation matrix, row by row"
         if layout.rotation == QUATERNIONS:
@@ -463,13 +485,15 @@ def _read_optional_columns(
                 layout.stated_units,
                 options.units,
             )
-            cells = layout.text.cells({name: header}, scales_of(unit), rows)
+            cells = layout.text.cells({name: header}, find_scales(unit), rows)
             values = _read_times(cells) if name == "time_s" else cells.numbers(name)
         except InputError as error:
             if name in headers or name in options.units or name == "u95_m":
-                allowed = f"{error.allowed}, or --ignore {header!r}"
                 raise InputError(
-                    error.source, error.key, error.found, allowed
+                    error.source,
+                    error.key,
+                    error.found,
+                    f"{error.allowed}, or --ignore {header!r}",
                 ) from None
             note = f"{header!r} not read: {error.key} has {error.found}"
             optional.notes.append(note)
@@ -496,8 +520,9 @@ def _read_times(cells: Cells) -> np.ndarray:
         are_dates = all("-" in text or "/" in text for text in texts)
         if dates.notna().all() and are_dates:
             return (dates - pd.Timestamp(0, tz="UTC")).dt.total_seconds().to_numpy()
-    allowed = "numbers, or dates as 2023-05-04 10:20:33"
-    raise cells.fault(numbers.index(None), "time_s", allowed)
+    raise cells.fault(
+        numbers.index(None), "time_s", "numbers, or dates as 2023-05-04 10:20:33"
+    )
 
 
 def _read_targets(cells: Cells, stated_name: str | None) -> np.ndarray:
@@ -511,8 +536,12 @@ def _read_targets(cells: Cells, stated_name: str | None) -> np.ndarray:
         source = "--target"
         key = ""
     else:
-        allowed = "--target NAME, the target of all rows, or --column target=NAME"
-        raise InputError(cells.path, "header", "no column target", allowed)
+        raise InputError(
+            cells.path,
+            "header",
+            "no column target",
+            "--target NAME, the target of all rows, or --column target=NAME",
+        )
     for name in dict.fromkeys(names):
         fault = find_text_fault(name)
         if fault:

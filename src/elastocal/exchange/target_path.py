@@ -1,9 +1,9 @@
-"""A file of wanted poses of the end effector: position and rotation vector in base
-axes, and what the robot works under.
+"""A file of target poses of the end effector, with loads and postures.
 
 Columns ``x, y, z`` (m) and ``rx, ry, rz`` (rotation vector, rad) of the last measuring
-point; ``fx .. mz`` (N, N m) where it is loaded, forces alone with moments of zero; ``q1
-.. qn`` (rad, as the controller reports them) near which the robot shall stand.
+point in base axes; optionally ``fx .. mz`` (N, N m), its load, or the forces alone if all
+moments are zero; and optionally ``q1 .. qn`` (rad, as the controller reports them), joint
+angles of the posture in which the robot shall reach the pose.
 """
 
 from dataclasses import dataclass
@@ -20,20 +20,26 @@ from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 
 _POSE = ("x", "y", "z", "rx", "ry", "rz")
-# Of a corrected target.
+# Status of a corrected target.
 OK = "ok"
-# Of a corrected target whose error nothing bounds, before the reason.
+# Status of a corrected target without a bound on its error; the reason follows.
 NO_BOUND = "no bound: "
-# A position farther from the base than any arm reaches is in other units.
+# Upper bound on a coordinate. No arm reaches farther, so that a larger one is not in
+# metres.
 _FARTHEST_M = 10.0
 
 
 @dataclass(frozen=True)
 class TargetPath:
-    """N wanted poses; None where the file has no such columns.
+    """N target poses.
 
-    `position` (N, 3): m, base axes. `rotation` (N, 3, 3). `start` (N, n): rad. `wrench`
-    (N, 6): N, N m. `lines` (N,) of int: line of the file of each pose.
+    Attributes
+    ----------
+    position : (N, 3), m, base axes.
+    rotation : (N, 3, 3).
+    start : joint angles of the posture, (N, n), rad; None if the file has none.
+    wrench : load, (N, 6), N and N m; None if the file has none.
+    lines : line of the file of each pose.
     """
 
     position: np.ndarray
@@ -47,7 +53,7 @@ class TargetPath:
 
 
 def read_target_path(path: str | Path, joints: int) -> TargetPath:
-    """Read a file of wanted poses.
+    """Read a file of target poses.
 
     Parameters
     ----------
@@ -86,27 +92,38 @@ def _check_columns(text: TextTable, angles: tuple[str, ...]) -> None:
     header = f"line {text.dialect.header}"
     for name in _POSE:
         if name not in text.columns:
-            allowed = (
-                f"{', '.join(_POSE)}: position in m and rotation vector in rad, base"
-                " axes, separated by commas"
+            raise InputError(
+                text.path,
+                header,
+                f"no column {name!r}",
+                (
+                    f"{', '.join(_POSE)}: position in m and rotation vector in rad, base"
+                    " axes, separated by commas"
+                ),
             )
-            raise InputError(text.path, header, f"no column {name!r}", allowed)
-    known = (*_POSE, *WRENCH_NAMES, *angles)
+    allowed_names = (*_POSE, *WRENCH_NAMES, *angles)
     for name in text.columns:
-        if name not in known:
-            found = f"the unknown column {name!r}"
-            raise InputError(text.path, header, found, suggest_names(name, known))
+        if name not in allowed_names:
+            raise InputError(
+                text.path,
+                header,
+                f"the unknown column {name!r}",
+                suggest_names(name, allowed_names),
+            )
 
 
 def _check_size(
     text: TextTable, quantity: str, size: np.ndarray, largest: float, unit: str
 ) -> None:
-    """Refuse the largest of some sizes (N,) if it exceeds a bound."""
+    """Refuse the largest of the sizes (N,) of a quantity if it exceeds a bound."""
     row = int(np.argmax(size))
     if size[row] > largest:
-        found = f"a {quantity} of {size[row]:g}"
-        allowed = f"{unit}, {largest:.3g} at most"
-        raise InputError(text.path, f"line {text.lines[row]}", found, allowed)
+        raise InputError(
+            text.path,
+            f"line {text.lines[row]}",
+            f"a {quantity} of {size[row]:g}",
+            f"{unit}, {largest:.3g} at most",
+        )
 
 
 def _read_all_or_none(
@@ -118,19 +135,25 @@ def _read_all_or_none(
     if not present:
         return None
     if missing:
-        found = f"{', '.join(present)} without {', '.join(missing)}"
+        problem = f"{', '.join(present)} without {', '.join(missing)}"
         header = f"line {text.dialect.header}"
-        raise InputError(text.path, header, found, "all of them or none")
+        raise InputError(text.path, header, problem, "all of them or none")
     return cells.matrix(names)
 
 
 def read_target_path_for(path: str | Path, robot: Robot) -> TargetPath:
-    """As `read_target_path`; an InputError refuses joint angles in degrees too."""
-    wanted = read_target_path(path, robot.joints)
-    if wanted.start is not None and (wrong := find_degrees(wanted.start, robot)).any():
-        row, joint = np.argwhere(wrong)[0]
+    """Read a file of target poses for a robot; joint angles in degrees are refused too."""
+    targets = read_target_path(path, robot.joints)
+    if targets.start is None:
+        return targets
+    in_degrees = find_degrees(targets.start, robot)
+    if in_degrees.any():
+        row, joint = np.argwhere(in_degrees)[0]
         low, high = robot.joint_limits[joint]
-        found = f"q{joint + 1} looks like degrees: {wanted.start[row, joint]:g}"
-        allowed = f"rad, of a joint that goes from {low:.2f} to {high:.2f} rad"
-        raise InputError(path, f"line {wanted.lines[row]}", found, allowed)
-    return wanted
+        raise InputError(
+            path,
+            f"line {targets.lines[row]}",
+            f"q{joint + 1} looks like degrees: {targets.start[row, joint]:g}",
+            f"rad, of a joint that goes from {low:.2f} to {high:.2f} rad",
+        )
+    return targets

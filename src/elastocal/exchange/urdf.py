@@ -232,10 +232,12 @@ def _convert_limits(joint: Joint, source: str) -> list[float]:
             return list(UNLIMITED_DEG)
         limits = [math.degrees(limit) for limit in limits]
     elif joint.lower >= joint.upper:
-        key = f"joint {joint.name!r}: limit"
-        found = f"{joint.lower:g} to {joint.upper:g}"
-        allowed = 'of a prismatic joint, <limit lower="..." upper="..."> in metres'
-        raise InputError(source, key, found, allowed)
+        raise InputError(
+            source,
+            f"joint {joint.name!r}: limit",
+            f"{joint.lower:g} to {joint.upper:g}",
+            'of a prismatic joint, <limit lower="..." upper="..."> in metres',
+        )
     return [round(limit, _DECIMALS) for limit in limits]
 
 
@@ -305,8 +307,12 @@ def _read_numbers(
     numbers = [value for value in values if value is not None]
     if not len(values) == len(numbers) == count:
         kind = "a number" if count == 1 else f"{count} numbers"
-        allowed = f"{kind}, up to {largest:g} in size"
-        raise InputError(source, f"{key}: {tag} {attribute}", repr(text), allowed)
+        raise InputError(
+            source,
+            f"{key}: {tag} {attribute}",
+            repr(text),
+            f"{kind}, up to {largest:g} in size",
+        )
     return numbers
 
 
@@ -329,11 +335,15 @@ class _Builder(ElementTree.TreeBuilder):
         self.depth = 0
 
     def doctype(self, *_: object) -> None:
-        allowed = (
-            "a URDF without a document type, whose entities could be endless or other"
-            " files"
+        raise InputError(
+            self.source,
+            "",
+            "<!DOCTYPE",
+            (
+                "a URDF without a document type, whose entities could be endless or other"
+                " files"
+            ),
         )
-        raise InputError(self.source, "", "<!DOCTYPE", allowed)
 
     def start(self, tag: str, attrs: dict[str, str]) -> Element:
         uri, _, name = tag.rpartition("}")
@@ -350,8 +360,9 @@ class _Builder(ElementTree.TreeBuilder):
 
     def _refuse_more_than(self, count: int, most: int, noun: str) -> None:
         if count > most:
-            found = f"more than {most} {noun}"
-            raise InputError(self.source, "", found, "a URDF, which needs fewer")
+            raise InputError(
+                self.source, "", f"more than {most} {noun}", "a URDF, which needs fewer"
+            )
 
     def end(self, tag: str) -> Element:
         self.depth -= 1
@@ -364,9 +375,12 @@ def _parse(data: bytes, source: str) -> Element:
     try:
         root = ElementTree.fromstring(data, parser)
     except ElementTree.ParseError as error:
-        key = f"line {error.position[0]}"
-        found = str(error).partition(":")[0]
-        raise InputError(source, key, found, "a URDF, which is XML") from None
+        raise InputError(
+            source,
+            f"line {error.position[0]}",
+            str(error).partition(":")[0],
+            "a URDF, which is XML",
+        ) from None
     except InputError:
         raise
     except (ValueError, LookupError) as error:
@@ -388,39 +402,51 @@ def _check_tree(
         key = f"joint {joint.attrib['name']!r}"
         joint_type = joint.get("type")
         if joint_type not in _KINDS:
-            found = f"type {joint_type!r}"
-            raise InputError(source, key, found, " | ".join(_KINDS))
+            raise InputError(source, key, f"type {joint_type!r}", " | ".join(_KINDS))
         ends = {tag: _get_end(joint, tag) for tag in ("parent", "child")}
         for tag, link in ends.items():
             if link not in link_names:
-                found = f"{tag} {link!r}"
-                raise InputError(source, key, found, "a link of this file")
+                raise InputError(source, key, f"{tag} {link!r}", "a link of this file")
         child = ends["child"]
         if child in parents:
-            found = f"child {child!r}, which another joint has too"
-            raise InputError(source, key, found, "a tree: each link below one joint")
+            raise InputError(
+                source,
+                key,
+                f"child {child!r}, which another joint has too",
+                "a tree: each link below one joint",
+            )
         parents[child] = ends["parent"]
     try:
         TopologicalSorter(
             {child: [parent] for child, parent in parents.items()}
         ).prepare()
     except CycleError as error:
-        key = f"link {error.args[1][0]!r}"
-        allowed = "a tree: no link below itself"
-        raise InputError(source, key, "a loop of joints", allowed) from None
+        raise InputError(
+            source,
+            f"link {error.args[1][0]!r}",
+            "a loop of joints",
+            "a tree: no link below itself",
+        ) from None
 
 
 def _check_names(tag: str, elements: Sequence[Element], source: str) -> None:
     """Refuse no elements, too many, and names that are missing or used twice."""
     if not 0 < len(elements) <= _MOST_PARTS:
-        found = f"{len(elements)} times <{tag}>" if elements else f"no <{tag}>"
-        allowed = f"a URDF with links and joints, at most {_MOST_PARTS}"
-        raise InputError(source, "", found, allowed)
+        raise InputError(
+            source,
+            "",
+            f"{len(elements)} times <{tag}>" if elements else f"no <{tag}>",
+            f"a URDF with links and joints, at most {_MOST_PARTS}",
+        )
     counts = Counter(element.get("name", "") for element in elements)
     for name, count in counts.items():
         if count > 1 or not name:
-            allowed = "a name for each, and each name once"
-            raise InputError(source, f"{tag} {name!r}", f"{count} times", allowed)
+            raise InputError(
+                source,
+                f"{tag} {name!r}",
+                f"{count} times",
+                "a name for each, and each name once",
+            )
 
 
 def find_chain(
@@ -440,29 +466,37 @@ def find_chain(
     for name in points:
         if name not in on_chain:
             names = suggest_names(name, on_chain)
-            allowed = f"a link between {base!r} and {tip!r}: {names}"
-            raise InputError(source, "point", repr(name), allowed)
+            raise InputError(
+                source,
+                "point",
+                repr(name),
+                f"a link between {base!r} and {tip!r}: {names}",
+            )
     marks = {name: f"[{format_point_name(name)}]" for name in (*points, tip)}
     if len(set(marks.values())) < len(marks):
-        allowed = "links whose names differ by more than blanks and brackets"
-        raise InputError(source, "point", ", ".join(map(repr, marks)), allowed)
-    words = [marks.get(base, "")]
+        raise InputError(
+            source,
+            "point",
+            ", ".join(map(repr, marks)),
+            "links whose names differ by more than blanks and brackets",
+        )
+    tokens = [marks.get(base, "")]
     moving: list[Joint] = []
     frame = np.eye(4)
     links = {base: (0, frame)}
     for joint in path:
-        words += format_displacement(joint.origin)
+        tokens += format_displacement(joint.origin)
         frame = frame @ joint.origin
         if joint.kind in _MOVING:
             moving.append(joint)
             axis = express_axis(joint.axis)
             coordinate = f"{axis.sign}q{len(moving)}"
             motion = f"{_MOVING[joint.kind]}{axis.letter}({coordinate})"
-            words += [*axis.before, motion, *axis.after]
+            tokens += [*axis.before, motion, *axis.after]
             frame = make_transform(axis.rotation.T)
-        words.append(marks.get(joint.child, ""))
+        tokens.append(marks.get(joint.child, ""))
         links[joint.child] = (len(moving), frame)
-    return UrdfChain(" ".join(filter(None, words)), tuple(moving), links)
+    return UrdfChain(" ".join(filter(None, tokens)), tuple(moving), links)
 
 
 def _find_path(urdf: Urdf, base: str, tip: str, source: str) -> list[Joint]:
@@ -470,18 +504,23 @@ def _find_path(urdf: Urdf, base: str, tip: str, source: str) -> list[Joint]:
     chain."""
     for key, name in (("base", base), ("tip", tip)):
         if name not in urdf.moments:
-            allowed = f"a link: {suggest_names(name, [*urdf.moments])}"
-            raise InputError(source, key, repr(name), allowed)
+            raise InputError(
+                source,
+                key,
+                repr(name),
+                f"a link: {suggest_names(name, [*urdf.moments])}",
+            )
     key = f"base {base!r}, tip {tip!r}"
     path = urdf.path_to(tip, base)
     if base != (path[0].parent if path else tip):
-        found = "two branches of the tree"
+        problem = "two branches of the tree"
         if any(joint.parent == tip for joint in urdf.joints_above(base)):
-            found = "a base that the tip carries (give them the other way round)"
-        raise InputError(source, key, found, "a tip that the base carries")
+            problem = "a base that the tip carries (give them the other way round)"
+        raise InputError(source, key, problem, "a tip that the base carries")
     if not any(joint.kind in _MOVING for joint in path):
-        found = "no joint that moves between them"
-        raise InputError(source, key, found, "links with joints between")
+        raise InputError(
+            source, key, "no joint that moves between them", "links with joints between"
+        )
     for joint in path:
         _check_joint(joint, source)
     return path
@@ -492,14 +531,18 @@ def _check_joint(joint: Joint, source: str) -> None:
     key = f"joint {joint.name!r}"
     kinds = (*_MOVING, "fixed")
     if joint.mimics or joint.kind not in kinds:
-        found = f"type {joint.kind}"
+        problem = f"type {joint.kind}"
         if joint.mimics:
-            found = "a joint that mimics another one"
-        allowed = (
-            f"{' | '.join(kinds)}; parallel links are written in the robot file, see"
-            " docs/campaign.md"
+            problem = "a joint that mimics another one"
+        raise InputError(
+            source,
+            key,
+            problem,
+            (
+                f"{' | '.join(kinds)}; parallel links are written in the robot file, see"
+                " docs/campaign.md"
+            ),
         )
-        raise InputError(source, key, found, allowed)
     if joint.kind in _MOVING and not np.linalg.norm(joint.axis) > _SHORTEST_AXIS:
         axis = " ".join(f"{component:g}" for component in joint.axis)
         raise InputError(source, f"{key}: axis xyz", axis, "a direction")

@@ -105,15 +105,23 @@ def _find_ends(urdf: Urdf, robot: Robot, source: str) -> tuple[str, str]:
     point = robot.chain.end_effector.name
     tips = [link for link in urdf.moments if format_point_name(link) == point]
     if not tips:
-        found = f"no link {point!r}, the robot's last measuring point"
-        raise InputError(source, "", found, _IMPORTED_URDF)
+        raise InputError(
+            source,
+            "",
+            f"no link {point!r}, the robot's last measuring point",
+            _IMPORTED_URDF,
+        )
     for tip in tips:
         for joint in reversed(urdf.path_to(tip, None)):
             if _has_chain(urdf, joint.parent, tip, robot, source):
                 return joint.parent, tip
     joints = ", ".join(robot.joint_names or ()) or format_count(robot.joints, "joint")
-    found = f"no chain to {point!r} by {joints} as the robot file has it"
-    raise InputError(source, "", found, _IMPORTED_URDF)
+    raise InputError(
+        source,
+        "",
+        f"no chain to {point!r} by {joints} as the robot file has it",
+        _IMPORTED_URDF,
+    )
 
 
 def _has_chain(urdf: Urdf, base: str, tip: str, robot: Robot, source: str) -> bool:

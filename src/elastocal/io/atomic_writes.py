@@ -48,8 +48,8 @@ def check_places(*paths: str | Path, top: Path | None = None) -> None:
 
 
 def check_folder(folder: str | Path) -> None:
-    """Refuse a folder that contains links, pipes or devices at any depth, because what
-    is written there would go elsewhere."""
+    """Refuse a folder that contains links, pipes or devices at any depth, because files
+    that are written there would go elsewhere."""
     # Another run may remove an entry that was just listed.
     with suppress(FileNotFoundError), os.scandir(folder) as entries:
         for entry in entries:

@@ -22,7 +22,7 @@ _LIBRARIES = ("numpy", "pandas", "pyarrow", "scipy")
 
 @dataclass(frozen=True)
 class Origin:
-    """What a file was made from.
+    """Commit, configuration and seed behind a file.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ def list_versions(folder: str | Path) -> dict[str, str]:
 
 
 def describe_provenance(settings: Any, **facts: Any) -> dict[str, Any]:
-    """Return what a table was made from, JSON-serialisable.
+    """Return the provenance of a table, JSON-serialisable.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Write and read tables as Parquet files that carry their units and their provenance.
 
-A file is one tidy table. The metadata of a column have its unit and meaning; those of
-the file have the name of the schema and the provenance. Row groups are blocks of data
+A file is one tidy table. Column metadata hold unit and meaning; file
+metadata hold the name of the schema and the provenance. Row groups are blocks of data
 sets, so that a table of any length is processed in the same memory. `io.records` checks
 that a file is as it was written.
 """
@@ -78,7 +78,7 @@ def write_table(
     path : file.
     schema : schema of the table.
     blocks : one value or array for each column; all arrays of a block have one length.
-    provenance : what the table was made from; JSON-serialisable.
+    provenance : configuration and version behind the table; JSON-serialisable.
 
     Raises
     ------
@@ -298,7 +298,7 @@ def _check_block(
     names = [column.name for column in schema.columns]
     if set(block) != set(names):
         different = ", ".join(sorted(set(block) ^ set(names)))
-        raise InputError(path, "columns", different, f"those of {schema.name}")
+        raise InputError(path, "columns", different, f"the columns of {schema.name}")
     arrays = {
         column.name: np.ascontiguousarray(
             block[column.name], object if column.is_text else column.type

@@ -20,7 +20,7 @@ _LONGEST_NUMBER = 100
 
 
 def describe_file_kind(mode: int) -> str:
-    """Return what a path is, such as "a link", from the mode of its status."""
+    """Return the kind of a file, such as "a link", from the mode of its status."""
     kinds = {
         stat.S_IFREG: "file",
         stat.S_IFLNK: "link",
@@ -49,7 +49,7 @@ def read_bytes(
     ----------
     path : file.
     largest : largest size in bytes.
-    kind : what the file should be, for messages.
+    kind : kind of file that is expected, for messages.
 
     Raises
     ------

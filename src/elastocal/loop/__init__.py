@@ -1,5 +1,3 @@
-"""Closing the loop on a campaign: from its folder to the verdict, and the tables in
-between. The science is below.
-
-Imports `diagnosis` and what that imports.
+"""Close the loop on a campaign: from its folder to the verdict, with the tables in
+between. The packages below do the science.
 """

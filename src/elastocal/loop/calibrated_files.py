@@ -102,9 +102,7 @@ class DiagnosedCampaign:
             regression = build_residual_model(
                 self.case,
                 estimate,
-                fit_to_observations(
-                    to_document(remainder), model, estimate, self.case.observations
-                ),
+                fit_to_observations(remainder, model, estimate, self.case.observations),
                 remainder.spread.typical,
                 self.verdict.noise.position_m,
             )

@@ -232,9 +232,9 @@ def tabulate_candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Return the rows of candidates.csv.
 
     Tested candidates come first, by falling Bayes factor, then the others with a note
-    why they were not tested. ``log_bayes_factor`` is that of the candidate alone against
-    the declared model, averaged over its size; ``probability`` is that of being in the
-    model; ``chosen`` says whether the most probable model contains it.
+    why they were not tested. ``log_bayes_factor`` compares the model with this
+    candidate alone to the declared model, averaged over its size; ``probability`` is its
+    posterior inclusion probability; ``chosen`` says whether the most probable model contains it.
     """
     candidates = diagnosis.case.candidates
     rows = []

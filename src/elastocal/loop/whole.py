@@ -139,7 +139,8 @@ def build_calibrated_robot(
     )
     noise_m = final.noise.position_m
     regression = None
-    if delivered is not None and delivered.predictor is not None:
+    spread = delivered.choice.spread if delivered is not None else None
+    if delivered is not None and delivered.predictor is not None and spread is not None:
         noise_m = diagnosis.verdict.noise.position_m
         if not physics_only:
             residual = delivered.residual
@@ -147,7 +148,7 @@ def build_calibrated_robot(
                 case,
                 final.estimate,
                 delivered.predictor,
-                delivered.chosen["spread"]["typical"],
+                spread.typical,
                 noise_m,
             )
     robot = calibrate_on_case(

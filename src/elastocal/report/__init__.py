@@ -1,4 +1,3 @@
-"""Reports as PDF: facts and sentences for the Typst templates that stand beside them.
-
-Imports what it reports on: `study`, `diagnosis`, `effects`.
+"""Reports of the study, of a campaign, of a plan and of a certificate: facts, templates
+and pages.
 """

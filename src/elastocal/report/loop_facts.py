@@ -1,5 +1,5 @@
-"""What the report of a campaign shows, as PDF and as a page: rows of tables, and the
-sentences of `campaign.txt`."""
+"""Collect the facts of a campaign's report, for the PDF and the page: rows of tables, and
+the sentences of `campaign.txt`."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ _SHOWN_LOCATIONS = 4
 def format_title(
     verdict: str, effects: Sequence[object], repeatable: RepeatableResidual | None
 ) -> str:
-    """Return a verdict in one line, with what remains without a name.
+    """Return a verdict in one line; it mentions a repeatable residual.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def render_campaign_sentences(
     experiment: Sequence[Mapping[str, Any]] = (),
     descriptions: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """Return what `campaign.txt` says of a campaign, by headings.
+    """Render the sentences of `campaign.txt` on a campaign, by headings.
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ class _Cause:
 
 
 def tabulate_causes(verdict: Verdict) -> list[dict[str, Any]]:
-    """Return what may be missing, the most probable cause first.
+    """Return the possible causes, the most probable one first.
 
     Each row has the cause in words, its probability and, if it was found, its cost and
     its gain at the validation poses. Mechanisms may act together, so probabilities need
@@ -435,8 +435,7 @@ def _format_interval(step: Mapping[str, Any]) -> str:
 
 
 def summarize_effect(effect: str) -> str:
-    """Return what an effect of the catalogue is: the first line of its docstring,
-    without the formula."""
+    """Return the first line of an effect's docstring without its formula."""
     definition = list_effects().get(effect)
     summary = say.split_underscores(effect)
     if definition and definition.doc:

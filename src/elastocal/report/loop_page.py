@@ -35,7 +35,7 @@ _STAGES = ("before", "after")
 def build_loop_page(
     facts: Mapping[str, Any], table: Mapping[str, np.ndarray], robot: Robot
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return what the page of a campaign states, and what it draws.
+    """Return the texts of the page of a campaign, and the data that it draws.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What was measured in a campaign, as rows of a table of its report."""
+"""Summarize the measurements of a campaign as rows of a table of its report."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MAX_TARGETS = 12
 def tabulate_measured(
     table: Mapping[str, np.ndarray], descriptions: Mapping[str, Any]
 ) -> list[list[str]]:
-    """Return rows of what was measured: name, at fitted poses, at validation poses.
+    """Return rows on the measurements: name, at fitted poses, at validation poses.
 
     Parameters
     ----------

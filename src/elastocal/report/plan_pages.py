@@ -26,7 +26,7 @@ _LOAD_NAMES = {0.0: "0", 1.0: "+F", -1.0: "−F"}
 def collect_plan_facts(
     survey: Survey, plan: Plan, rows: pd.DataFrame, worth: Sequence[str]
 ) -> dict[str, Any]:
-    """Return what the sheet of a plan shows.
+    """Return the facts of the sheet of a plan.
 
     Parameters
     ----------

@@ -1,2 +1,2 @@
-"""What physics leaves: whether it is a function of the joints, and regressions on
-it."""
+"""Regressions on the residuals of the physical model, and a test whether these depend
+on the joint angles."""

@@ -1,9 +1,9 @@
-"""Regressions on the residuals of a fitted model: the catalogue, what each of them is
-shown, and what it predicts.
+"""Regressions on the residuals of a fitted model: the catalogue, their inputs and their
+predictions.
 
-Each is a function of inputs of M observations, their residuals (M, 3), m, base axes,
-settings, and the seed of whatever it draws; it yields a predictor for each setting in
-turn.
+A regression is a function of the inputs of M observations, their residuals (M, 3), m,
+base axes, a sequence of settings, and the seed of its random numbers. It yields one
+predictor for each setting.
 """
 
 from __future__ import annotations
@@ -25,49 +25,56 @@ if TYPE_CHECKING:
 
     Setting = Mapping[str, Any]
 
-# Observations whose columns or covariances are held at once; trees of a forest.
-_AT_ONCE = 500
+# Number of observations whose columns or covariances are in memory at once.
+_CHUNK = 500
+# Trees of a forest.
 _TREES = 100
 # Penalties of functions of two joints, in mean squares of a column.
 _PENALTIES = np.logspace(-4.0, 2.0, 7)
-# Hyperparameters come from so many observations: a step towards them costs the third
-# power of their number, and 800 take eight times as long for errors that differ by 2 %
-# either way (UR5 and UR10).
-_MOST_FOR_HYPERPARAMETERS = 300
-# Observations at which the process has values, drawn at random; their covariance takes
-# 32 MB. Held-out RMS of UR10 A (8,350 observations) after geometry: 0.169 mm with 1,000
-# in 0.5 s, 0.141 with 2,000 in 1.7 s, 0.122 with all in 14 s and 0.56 GB.
-_MOST = 2_000
-# Variance of the process, lengths in standard deviations of each input, from wiggles
-# between neighbours to one trend across all poses, and variance of the noise: where the
-# search starts, and its bounds.
+# Observations from which the hyperparameters of the process are estimated. A step of
+# this search costs the third power of their number; 800 observations take eight times
+# as long and change errors by 2 % in either direction (UR5 and UR10).
+_MAX_FOR_HYPERPARAMETERS = 300
+# Upper bound on the inducing points of the process, drawn at random from the
+# observations; their covariance takes 32 MB. Held-out RMS of UR10 A (8,350
+# observations) after geometry: 0.169 mm with 1,000 in 0.5 s, 0.141 with 2,000 in 1.7 s,
+# 0.122 with all in 14 s and 0.56 GB.
+_MAX_INDUCING_POINTS = 2_000
+# Start and bounds of the search for the hyperparameters: the variance of the process;
+# lengths in standard deviations of each input, from changes between neighbours to one
+# trend across all poses; and the variance of the noise.
 _VARIANCE = (1.0, 1e-3, 1e3)
 _LENGTH = (1.0, 0.05, 100.0)
 _NOISE = (0.5, 1e-4, 10.0)
-# By which share of the likelihood's logarithm the last steps of the search raise it:
-# scipy's own 2e-9 stops on a plateau, whose way out changes of the residuals by 1e-8
-# decided (the simulated KUKA: a regression or none).
-_LAST_GAIN = 1e-11
-# Of the variance: added to the diagonal, so that rounding leaves it positive definite.
+# The search stops when a step raises the log likelihood by less than this share. With
+# scipy's default of 2e-9 it stopped on a plateau, and changes of the residuals by 1e-8
+# decided the way out (simulated KUKA: a regression or none).
+_LIKELIHOOD_TOLERANCE = 1e-11
+# Share of the variance that is added to the diagonal, so that the covariance is positive
+# definite despite rounding.
 _JITTER = 1e-8
-# An input that differs by less than this over all poses says nothing: rad, N, m, s,
+# An input whose standard deviation over all poses is smaller is constant: rad, N, m, s,
 # degC.
-_STILL = 1e-10
+_CONSTANT_STD = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """What a regression may know of an observation; arrays of M.
+    """Inputs of a regression at M observations.
 
-    `joint_angles` (M, n): rad. `others` (M, k): wrench and place of the target in its
-    measuring point; neither time nor temperature, of which a correction knows nothing.
-    `jacobian` (M, 3, C): of the target's position with respect to the joints, first,
-    and whatever else of the chain may be displaced: base and links; base axes, m per
-    rad or m; then what effects of the model do, see `corrected.inputs_of`.
+    Attributes
+    ----------
+    joint_angles : (M, n) array, rad
+    covariates : (M, k) array
+        Wrench, and position of the target in the frame of its measuring point. Time and
+        temperature are not included, because a correction does not know them.
+    jacobian : (M, 3, C) array, base axes
+        Displacement of the target by the joints first, then by base and links, m per rad
+        or m; then by the effects of the model, see `selection.build_inputs`.
     """
 
     joint_angles: np.ndarray
-    others: np.ndarray
+    covariates: np.ndarray
     jacobian: np.ndarray
 
     def __len__(self) -> int:
@@ -75,148 +82,189 @@ class Inputs:
 
     @property
     def columns(self) -> np.ndarray:
-        """ndarray (M, n + k): joint angles, then the others."""
-        return np.hstack([self.joint_angles, self.others])
+        """Joint angles and covariates, (M, n + k) array."""
+        return np.hstack([self.joint_angles, self.covariates])
 
     def select(self, chosen: np.ndarray | slice) -> Inputs:
-        """The inputs of some observations."""
+        """Select observations."""
         return Inputs(
-            self.joint_angles[chosen], self.others[chosen], self.jacobian[chosen]
+            self.joint_angles[chosen], self.covariates[chosen], self.jacobian[chosen]
         )
 
 
 @dataclass(frozen=True)
 class Predictor:
-    """A fitted regression, by functions of inputs of other observations.
+    """A fitted regression, as functions of the inputs of M other observations.
 
-    `mean`: predicted residuals (M, 3), m, base axes. `std`: standard deviation (M, 3)
-    of a new measurement about them, not a number where the regression states none.
+    Attributes
+    ----------
+    mean : function
+        Returns predicted residuals, (M, 3) array, m, base axes.
+    std : function
+        Returns the standard deviation of a new measurement about them, (M, 3) array, m;
+        not a number if the regression states none.
     """
 
     mean: Callable[[Inputs], np.ndarray]
-    std: Callable[[Inputs], np.ndarray] = lambda there: np.full((len(there), 3), np.nan)
+    std: Callable[[Inputs], np.ndarray] = lambda inputs: np.full(
+        (len(inputs), 3), np.nan
+    )
 
 
 @dataclass(frozen=True)
 class Regression:
     """An entry of the catalogue.
 
-    `words`: as people call it. `settings`: among which poses that a fit has not seen
-    choose; one where it chooses itself. `by_jacobian`: whether it looks at that, which
-    takes most of the memory.
+    Attributes
+    ----------
+    description : name for reports
+    fit : function of inputs, residuals, settings and seed, see the module
+    settings : hyperparameters among which cross-validation chooses; a single one if the
+        regression chooses by itself
+    uses_jacobian : whether it needs `Inputs.jacobian`, which takes most of the memory
     """
 
-    words: str
-    fitted: Callable[[Inputs, np.ndarray, Sequence[Setting], int], Iterator[Predictor]]
+    description: str
+    fit: Callable[[Inputs, np.ndarray, Sequence[Setting], int], Iterator[Predictor]]
     settings: Sequence[Setting] = ({},)
-    by_jacobian: bool = False
+    uses_jacobian: bool = False
 
 
 @dataclass(frozen=True)
-class _Geometry:
-    """The part of geometry in ridge regressions on it and other columns: along its
-    principal axes, which all of them share.
+class _RidgeSolution:
+    """Solution of a ridge regression on G geometry columns and D other columns.
 
-    `squares` (G,): eigenvalues of its Gram matrix. `axes` (G, G). `along` (G,):
-    products with the residual along these.
+    Attributes
+    ----------
+    coefficients : (G + D,) array
+    explained_square : product of the solution with the projected residual
+    log_determinant : ln |I + Gram matrix / penalty| of all columns
     """
 
-    squares: np.ndarray
+    coefficients: np.ndarray
+    explained_square: float
+    log_determinant: float
+
+
+@dataclass(frozen=True)
+class _GeometryBlock:
+    """The geometry columns that all ridge regressions on the same data share, along the
+    principal axes of their Gram matrix.
+
+    Attributes
+    ----------
+    eigenvalues : (G,) array
+    axes : (G, G) array, eigenvectors
+    projection : (G,) array, products of the columns along these axes with the residual
+    """
+
+    eigenvalues: np.ndarray
     axes: np.ndarray
-    along: np.ndarray
+    projection: np.ndarray
 
     @classmethod
-    def of(cls, gram: np.ndarray, right: np.ndarray) -> _Geometry:
-        """By its Gram matrix and its products with the residual."""
-        squares, axes = np.linalg.eigh(gram)
-        return cls(np.maximum(squares, 0.0), axes, axes.T @ right)
+    def from_products(cls, gram: np.ndarray, projection: np.ndarray) -> _GeometryBlock:
+        """Diagonalize the Gram matrix (G, G), given the products (G,) of the columns with
+        the residual."""
+        eigenvalues, axes = np.linalg.eigh(gram)
+        return cls(np.maximum(eigenvalues, 0.0), axes, axes.T @ projection)
 
     def mean_square(self, gram: np.ndarray) -> float:
-        """Of all columns, those with a Gram matrix (D, D) beside it."""
-        return max(
-            (self.squares.sum() + np.trace(gram)) / (len(self.squares) + len(gram)),
-            np.finfo(float).tiny,
-        )
+        """Mean square of all columns, with the others' Gram matrix (D, D)."""
+        trace = self.eigenvalues.sum() + np.trace(gram)
+        columns = len(self.eigenvalues) + len(gram)
+        return max(trace / columns, np.finfo(float).tiny)
 
-    def ridge(
-        self, mixed: np.ndarray, gram: np.ndarray, right: np.ndarray, penalty: float
-    ) -> tuple[np.ndarray, np.ndarray, float, float]:
-        """Coefficients of geometry and others, the squares that they explain, and ln |I
-        + G / penalty| of all columns.
+    def solve_ridge(
+        self,
+        cross_gram: np.ndarray,
+        gram: np.ndarray,
+        projection: np.ndarray,
+        penalty: float,
+    ) -> _RidgeSolution:
+        """Solve a ridge regression by the Schur complement of the geometry columns.
 
-        `mixed` (G, D): products of its principal axes with the others. `right` (D,): of
-        these with the residual.
+        Parameters
+        ----------
+        cross_gram : (G, D) array, products of the principal axes with the other columns
+        gram : (D, D) array, Gram matrix of the other columns
+        projection : (D,) array, products of the other columns with the residual
+        penalty : of all coefficients
         """
-        shrunk = mixed / (self.squares + penalty)[:, None]
-        lower, found, _ = lapack.dposv(
-            gram - shrunk.T @ mixed + penalty * np.eye(len(gram)),
-            right - shrunk.T @ self.along,
+        shrunk = cross_gram / (self.eigenvalues + penalty)[:, None]
+        factor, others, _ = lapack.dposv(
+            gram - shrunk.T @ cross_gram + penalty * np.eye(len(gram)),
+            projection - shrunk.T @ self.projection,
             lower=1,
         )
-        own = self.along / (self.squares + penalty) - shrunk @ found
-        volume = (
-            np.log1p(self.squares / penalty).sum()
-            + np.log(np.diag(lower) ** 2 / penalty).sum()
+        along_axes = self.projection / (self.eigenvalues + penalty) - shrunk @ others
+        log_determinant = (
+            np.log1p(self.eigenvalues / penalty).sum()
+            + np.log(np.diag(factor) ** 2 / penalty).sum()
         )
-        return self.axes @ own, found, self.along @ own + right @ found, volume
+        return _RidgeSolution(
+            np.concatenate([self.axes @ along_axes, others]),
+            self.projection @ along_axes + projection @ others,
+            log_determinant,
+        )
 
 
 def fit_ridge_harmonics(
     inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int
 ) -> Iterator[Predictor]:
-    """Harmonics of each joint's angle as deviations of that joint, beside geometry, by
-    ridge regression.
+    """Fit harmonics of each joint's angle as deviations of that joint, and geometry.
 
-    What gears, encoders and runout can do to a joint, without saying what: a Fourier
-    series of every joint carried to the target by the Jacobian, and constant
-    displacements of base and links, which resemble each other; all coefficients with
-    one penalty [1], in mean squares of a column.
+    The harmonics describe what gears, encoders and runout can do to a joint: a Fourier
+    series of every joint, carried to the target by the Jacobian. Constant displacements
+    of base and links resemble some of them, so both are fitted together by ridge
+    regression with one penalty for all coefficients [1]_, in mean squares of a column.
 
-    [1] Hoerl, A. E. and Kennard, R. W., Ridge regression: biased estimation for
-    nonorthogonal problems, Technometrics 12, 1970.
+    References
+    ----------
+    .. [1] Hoerl and Kennard, Ridge regression: biased estimation for nonorthogonal
+       problems, Technometrics 12, 1970.
     """
 
     # The same poses are predicted with one penalty after the other.
     @lru_cache(maxsize=2)
-    def columns(every: Inputs, first: int, orders: int) -> np.ndarray:
-        some = every.select(slice(first, first + _AT_ONCE))
-        return np.concatenate(
-            [some.jacobian, compute_harmonic_columns(some, orders)], axis=2
-        )
+    def build_columns(source: Inputs, start: int, orders: int) -> np.ndarray:
+        chunk = source.select(slice(start, start + _CHUNK))
+        harmonics = compute_harmonic_columns(chunk, orders)
+        return np.concatenate([chunk.jacobian, harmonics], axis=2)
 
-    most = max(setting["orders"] for setting in settings)
+    max_orders = max(setting["orders"] for setting in settings)
     joints = inputs.joint_angles.shape[1]
     split = inputs.jacobian.shape[2]
-    size = split + 2 * most * joints
+    size = split + 2 * max_orders * joints
     gram = np.zeros((size, size))
-    right = np.zeros(size)
-    for part in _parts(inputs):
-        rows = columns(inputs, part.start, most).reshape(-1, size)
+    projection = np.zeros(size)
+    for chunk in _split_into_chunks(inputs):
+        rows = build_columns(inputs, chunk.start, max_orders).reshape(-1, size)
         gram += rows.T @ rows
-        right += rows.T @ residual[part].ravel()
-    geometry = _Geometry.of(gram[:split, :split], right[:split])
-    mixed = geometry.axes.T @ gram[:split, split:]
-    own = gram[split:, split:]
-    along = right[split:]
+        projection += rows.T @ residual[chunk].ravel()
+    geometry = _GeometryBlock.from_products(gram[:split, :split], projection[:split])
+    cross_gram = geometry.axes.T @ gram[:split, split:]
     for setting in settings:
-        # Orders come first among the harmonics, so that fewer of them are the first
+        # Lower orders come first among the harmonics, so that fewer orders are the first
         # columns.
-        size = 2 * setting["orders"] * joints
-        penalty = setting["penalty"] * geometry.mean_square(own[:size, :size])
-        found = np.concatenate(
-            geometry.ridge(mixed[:, :size], own[:size, :size], along[:size], penalty)[
-                :2
-            ]
+        orders = setting["orders"]
+        end = split + 2 * orders * joints
+        harmonic_gram = gram[split:end, split:end]
+        solution = geometry.solve_ridge(
+            cross_gram[:, : end - split],
+            harmonic_gram,
+            projection[split:end],
+            setting["penalty"] * geometry.mean_square(harmonic_gram),
         )
 
         def mean(
-            there: Inputs,
-            coefficients: np.ndarray = found,
-            orders: int = setting["orders"],
+            queries: Inputs,
+            coefficients: np.ndarray = solution.coefficients,
+            orders: int = orders,
         ) -> np.ndarray:
-            return _stacked(
-                columns(there, part.start, orders) @ coefficients
-                for part in _parts(there)
+            return _concatenate(
+                build_columns(queries, chunk.start, orders) @ coefficients
+                for chunk in _split_into_chunks(queries)
             )
 
         yield Predictor(mean)
@@ -225,175 +273,207 @@ def fit_ridge_harmonics(
 def fit_two_joints(
     inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int
 ) -> Iterator[Predictor]:
-    """Functions of two joints' angles at once as deviations of joints, beside geometry:
-    what no catalogue of one joint's has.
+    """Fit functions of two joints' angles as deviations of joints, and geometry.
 
-    Ridge regression whose pair of joints and penalty have the largest marginal
-    likelihood, with the noise profiled [1].
+    Effects of the catalogue belong to one joint each and cannot describe such deviations.
+    The pair of joints and the penalty of this ridge regression have the largest marginal
+    likelihood, with the noise profiled [1]_.
 
-    [1] MacKay, D. J. C., Bayesian interpolation, Neural Computation 4, 1992.
+    References
+    ----------
+    .. [1] MacKay, Bayesian interpolation, Neural Computation 4, 1992.
     """
-
-    def functions(some: Inputs, pair: tuple[int, int]) -> np.ndarray:
-        return compute_pair_columns(some, pair, np.arange(some.joint_angles.shape[1]))
-
+    joints = np.arange(inputs.joint_angles.shape[1])
     target = residual.ravel()
     jacobian = inputs.jacobian.reshape(residual.size, -1)
-    most = -np.inf
-    geometry = _Geometry.of(jacobian.T @ jacobian, jacobian.T @ target)
-    for pair in combinations(range(inputs.joint_angles.shape[1]), 2):
-        rows = functions(inputs, pair).reshape(residual.size, -1)
-        mixed = geometry.axes.T @ (jacobian.T @ rows)
+    geometry = _GeometryBlock.from_products(jacobian.T @ jacobian, jacobian.T @ target)
+    largest_likelihood = -np.inf
+    for pair in combinations(range(len(joints)), 2):
+        rows = compute_pair_columns(inputs, pair, joints).reshape(residual.size, -1)
+        cross_gram = geometry.axes.T @ (jacobian.T @ rows)
         gram = rows.T @ rows
-        right = rows.T @ target
+        projection = rows.T @ target
         for penalty in _PENALTIES * geometry.mean_square(gram):
-            of_geometry, found, explained, volume = geometry.ridge(
-                mixed, gram, right, penalty
+            solution = geometry.solve_ridge(cross_gram, gram, projection, penalty)
+            unexplained = max(
+                target @ target - solution.explained_square, np.finfo(float).tiny
             )
-            left = max(target @ target - explained, np.finfo(float).tiny)
-            if (probable := -residual.size * np.log(left) - volume) > most:
-                most = probable
-                best = pair
-                coefficients = (of_geometry, found)
-    yield Predictor(
-        lambda there: (
-            there.jacobian @ coefficients[0] + functions(there, best) @ coefficients[1]
-        )
-    )
+            likelihood = -residual.size * np.log(unexplained) - solution.log_determinant
+            if likelihood > largest_likelihood:
+                largest_likelihood = likelihood
+                best_pair = pair
+                coefficients = solution.coefficients
+    split = jacobian.shape[1]
+
+    def mean(queries: Inputs) -> np.ndarray:
+        columns = compute_pair_columns(queries, best_pair, joints)
+        geometric = queries.jacobian @ coefficients[:split]
+        return geometric + columns @ coefficients[split:]
+
+    yield Predictor(mean)
 
 
 def fit_extra_trees(
     inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int
 ) -> Iterator[Predictor]:
-    """Extremely randomized trees: averages of neighbours in boxes, for whatever is not
-    smooth [1]; for all axes together.
+    """Fit extremely randomized trees for all axes together [1]_.
 
-    [1] Geurts, P., Ernst, D. and Wehenkel, L., Extremely randomized trees, Machine
-    Learning 63, 2006.
+    They average neighbours in boxes, which suits residuals that are not smooth.
+
+    References
+    ----------
+    .. [1] Geurts, Ernst and Wehenkel, Extremely randomized trees, Machine Learning 63,
+       2006.
     """
-    # Most of what needs the catalogue grows no tree.
+    # Import scikit-learn only here, because most users of the catalogue grow no tree.
     from sklearn.tree import ExtraTreeRegressor
 
-    (setting,), columns, target = (
-        settings,
-        inputs.columns.astype(np.float32),
-        np.ascontiguousarray(residual),
-    )
-    draws = np.random.RandomState(seed)
-    seeds = [draws.randint(np.iinfo(np.int32).max) for _ in range(_TREES)]
-    # One by one: a forest would look at the same inputs again for each of its trees.
+    (setting,) = settings
+    columns = inputs.columns.astype(np.float32)
+    target = np.ascontiguousarray(residual)
+    stream = np.random.RandomState(seed)
+    seeds = [stream.randint(np.iinfo(np.int32).max) for _ in range(_TREES)]
+    # Fit the trees one by one: a forest would check the same inputs for each tree.
     trees = [
-        ExtraTreeRegressor(random_state=each, **setting).fit(
+        ExtraTreeRegressor(random_state=tree_seed, **setting).fit(
             columns, target, check_input=False
         )
-        for each in seeds
+        for tree_seed in seeds
     ]
 
-    def mean(there: Inputs) -> np.ndarray:
-        asked = there.columns.astype(np.float32)
-        return np.mean(
-            [tree.predict(asked, check_input=False) for tree in trees], axis=0
-        )
+    def mean(queries: Inputs) -> np.ndarray:
+        rows = queries.columns.astype(np.float32)
+        predictions = [tree.predict(rows, check_input=False) for tree in trees]
+        return np.mean(predictions, axis=0)
 
     yield Predictor(mean)
+
+
+@dataclass(frozen=True)
+class _Hyperparameters:
+    """Variance of a Gaussian process, length of each scaled input (d,), and variance of
+    the noise."""
+
+    variance: float
+    lengths: np.ndarray
+    noise: float
+
+    @classmethod
+    def from_logarithms(cls, logarithms: np.ndarray) -> _Hyperparameters:
+        """Hyperparameters by their logarithms, in the order of the fields."""
+        variance, *lengths, noise = np.exp(logarithms)
+        return cls(variance, np.array(lengths), noise)
+
+
+@dataclass(frozen=True)
+class _GaussianProcess:
+    """A Gaussian process that is projected onto its values at N inducing points.
+
+    Attributes
+    ----------
+    hyperparameters : of scaled inputs and standardized residuals
+    points : (N, d) array, inducing points in units of the lengths
+    prior_factor : (N, N) Cholesky factor of their prior covariance
+    gram_factor : (N, N) Cholesky factor of the Gram matrix of the features plus the noise
+    weights : (N, 3) array, of the correlations with the inducing points
+    """
+
+    hyperparameters: _Hyperparameters
+    points: np.ndarray
+    prior_factor: np.ndarray
+    gram_factor: np.ndarray
+    weights: np.ndarray
+
+    def mean(self, inputs: np.ndarray) -> np.ndarray:
+        """Predict standardized residuals (M, 3) at scaled inputs (M, d)."""
+        inputs = inputs / self.hyperparameters.lengths
+        return _concatenate(
+            _evaluate_matern(inputs[chunk], self.points)[0] @ self.weights
+            for chunk in _split_into_chunks(inputs)
+        )
+
+    def std(self, inputs: np.ndarray) -> np.ndarray:
+        """Predict the standard deviation (M,) of new standardized residuals."""
+        variance = self.hyperparameters.variance
+        noise = self.hyperparameters.noise
+        inputs = inputs / self.hyperparameters.lengths
+        variances = [np.zeros(0)]
+        for chunk in _split_into_chunks(inputs):
+            features = _compute_features(
+                self.points, inputs[chunk], self.prior_factor, variance
+            )
+            solved = lapack.dtrtrs(self.gram_factor, features, lower=1)[0]
+            posterior = noise * (solved**2).sum(axis=0)
+            variances.append(variance + noise - (features**2).sum(axis=0) + posterior)
+        return np.sqrt(np.maximum(np.concatenate(variances), 0.0))
 
 
 def fit_gaussian_process(
     inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int
 ) -> Iterator[Predictor]:
-    """A Gaussian process: smooth in all inputs, with intervals that grow away from the
-    poses that were measured.
+    """Fit a Gaussian process: smooth in all inputs, with intervals that grow away from
+    the measured poses.
 
-    One process for all three axes, each with its own size: a Matérn kernel with a
-    length for each input, and noise, which have the largest marginal likelihood. Its
-    variance far from all poses is that of the residuals themselves, so that what it has
-    not seen it calls unknown [1]. With many observations it is projected onto its
-    values at some of them (section 8.3.4 of [1]), which is exact where these are all.
+    All three axes share one process, each with a size of its own: a Matérn kernel with
+    a length for each input, and noise, with the largest marginal likelihood. Far from
+    all poses its variance is that of the residuals themselves, so that its intervals
+    there say that nothing is known [1]_. With many observations the process is projected
+    onto its values at some of them (section 8.3.4 of [1]_); the result is exact if these
+    are all observations.
 
-    [1] Rasmussen, C. E. and Williams, C. K. I., Gaussian Processes for Machine Learning, chapters 2, 4, 5 and 8, MIT Press,
-        2006.
+    References
+    ----------
+    .. [1] Rasmussen and Williams, Gaussian Processes for Machine Learning, chapters 2,
+       4, 5 and 8, MIT Press, 2006.
     """
-    from scipy.optimize import Bounds, minimize
-
-    draws = np.random.default_rng(seed)
     columns = inputs.columns
-    taken = np.flatnonzero(columns.std(axis=0) > _STILL)
-    middle = columns[:, taken].mean(axis=0)
-    spread = columns[:, taken].std(axis=0)
-
-    def scaled(some: Inputs) -> np.ndarray:
-        return (some.columns[:, taken] - middle) / spread
-
-    known = scaled(inputs)
-    few, many = (
-        np.sort(draws.permutation(len(known))[:most])
-        for most in (_MOST_FOR_HYPERPARAMETERS, _MOST)
-    )
+    varying = np.flatnonzero(columns.std(axis=0) > _CONSTANT_STD)
+    center = columns[:, varying].mean(axis=0)
+    spread = columns[:, varying].std(axis=0)
     offset = residual.mean(axis=0)
     size = residual.std(axis=0)
     size = np.where(size > 0.0, size, 1.0)
-    standard = (residual - offset) / size
-    ranges = np.log([_VARIANCE, *[_LENGTH] * len(taken), _NOISE])
-    # A length at its bound is an input without influence, not a failure.
-    args = (known[few], standard[few])
-    bounds = Bounds(*ranges[:, 1:].T)
-    found = minimize(
-        _surprise,
-        ranges[:, 0],
-        args,
-        "L-BFGS-B",
-        jac=True,
-        bounds=bounds,
-        options={"ftol": _LAST_GAIN},
-    ).x
-    variance, *lengths, noise = np.exp(found)
-    places = known[many] / lengths
-    lower = lapack.dpotrf(
-        variance * (_matern(places, places)[0] + _JITTER * np.eye(len(many))), lower=1
-    )[0]
 
-    def features(asked: np.ndarray) -> np.ndarray:
-        return lapack.dtrtrs(
-            lower, variance * _matern(places, asked / lengths)[0], lower=1
-        )[0]
+    def scale(queries: Inputs) -> np.ndarray:
+        return (queries.columns[:, varying] - center) / spread
 
-    gram = noise * np.eye(len(many))
-    right = np.zeros((len(many), 3))
-    for part in _parts(inputs):
-        rows = features(known[part])
-        gram += rows @ rows.T
-        right += rows @ standard[part]
-    factor = lapack.dpotrf(gram, lower=1)[0]
-    weights = (
-        variance
-        * lapack.dtrtrs(
-            lower, lapack.dpotrs(factor, right, lower=1)[0], lower=1, trans=1
-        )[0]
-        * size
+    process = _fit_process(
+        scale(inputs), (residual - offset) / size, np.random.default_rng(seed)
+    )
+    yield Predictor(
+        lambda queries: process.mean(scale(queries)) * size + offset,
+        lambda queries: process.std(scale(queries))[:, None] * size,
     )
 
-    def mean(there: Inputs) -> np.ndarray:
-        asked = scaled(there)
-        return _stacked(
-            _matern(asked[part] / lengths, places)[0] @ weights + offset
-            for part in _parts(there)
-        )
 
-    def std(there: Inputs) -> np.ndarray:
-        asked = scaled(there)
-        found = [np.zeros(0)]
-        for part in _parts(there):
-            rows = features(asked[part])
-            unsure = noise * (lapack.dtrtrs(factor, rows, lower=1)[0] ** 2).sum(axis=0)
-            found.append(variance + noise - (rows**2).sum(axis=0) + unsure)
-        return np.sqrt(np.maximum(np.concatenate(found), 0.0))[:, None] * size
-
-    yield Predictor(mean, std)
+def _fit_process(
+    inputs: np.ndarray, residual: np.ndarray, stream: np.random.Generator
+) -> _GaussianProcess:
+    """Fit a process to scaled inputs (M, d) and standardized residuals (M, 3)."""
+    subset = np.sort(stream.permutation(len(inputs))[:_MAX_FOR_HYPERPARAMETERS])
+    inducing = np.sort(stream.permutation(len(inputs))[:_MAX_INDUCING_POINTS])
+    hyperparameters = _maximize_likelihood(inputs[subset], residual[subset])
+    variance = hyperparameters.variance
+    inputs = inputs / hyperparameters.lengths
+    points = inputs[inducing]
+    identity = np.eye(len(points))
+    correlation = _evaluate_matern(points, points)[0] + _JITTER * identity
+    prior_factor = lapack.dpotrf(variance * correlation, lower=1)[0]
+    gram = hyperparameters.noise * identity
+    projection = np.zeros((len(points), 3))
+    for chunk in _split_into_chunks(inputs):
+        features = _compute_features(points, inputs[chunk], prior_factor, variance)
+        gram += features @ features.T
+        projection += features @ residual[chunk]
+    gram_factor = lapack.dpotrf(gram, lower=1)[0]
+    coefficients = lapack.dpotrs(gram_factor, projection, lower=1)[0]
+    weights = variance * lapack.dtrtrs(prior_factor, coefficients, lower=1, trans=1)[0]
+    return _GaussianProcess(hyperparameters, points, prior_factor, gram_factor, weights)
 
 
 REGRESSIONS = {
-    # What the method's authors use for regression: all inputs at each node, and no node
-    # of fewer observations is split.
+    # The settings that the method's authors use for regression: all inputs are candidates
+    # at each node, and nodes of fewer observations are not split.
     "extra_trees": Regression(
         "forest of extremely randomized trees",
         fit_extra_trees,
@@ -404,107 +484,158 @@ REGRESSIONS = {
         "ridge regression on harmonics of the joint angles",
         fit_ridge_harmonics,
         tuple(
-            {"orders": n, "penalty": float(each)}
-            for n in (1, 2, 6, 12, 36)
-            for each in np.logspace(-5.0, 3.0, 9)
+            {"orders": orders, "penalty": float(penalty)}
+            for orders in (1, 2, 6, 12, 36)
+            for penalty in np.logspace(-5.0, 3.0, 9)
         ),
-        by_jacobian=True,
+        uses_jacobian=True,
     ),
     "two_joints": Regression(
         "ridge regression on functions of two joints' angles",
         fit_two_joints,
-        by_jacobian=True,
+        uses_jacobian=True,
     ),
 }
 
 
 def list_regressions() -> dict[str, Regression]:
-    """Regressions of this package, and those that installed packages offer, by name."""
-    return REGRESSIONS | _plugin_regressions()
+    """List the regressions of this package and of installed plug-ins, by name."""
+    return REGRESSIONS | _load_plugin_regressions()
 
 
 @cache
-def _plugin_regressions() -> dict[str, Regression]:
+def _load_plugin_regressions() -> dict[str, Regression]:
     return load_plugins(plugins.REGRESSIONS, Regression, REGRESSIONS)
 
 
 def compute_harmonic_columns(inputs: Inputs, orders: int) -> np.ndarray:
-    """Displacement of the target by one radian of each harmonic, (M, 3, 2 n orders),
-    lower orders first."""
-    waves = np.cumprod(
-        np.repeat(np.exp(1j * inputs.joint_angles)[:, None], orders, axis=1), axis=1
-    )
-    harmonics = np.stack([waves.imag, waves.real], axis=2)
-    along = inputs.jacobian[:, :, None, None, : inputs.joint_angles.shape[1]]
-    return (along * harmonics[:, None]).reshape(len(inputs), 3, -1)
+    """Displacement of the target by one radian of each harmonic of each joint's angle.
 
-
-def compute_pair_columns(
-    inputs: Inputs, pair: tuple[int, int], moved: np.ndarray
-) -> np.ndarray:
-    """What products of the first waves of two joints' angles, and the second of each,
-    do as deviations of joints: (M, 3, D)."""
-    angles = inputs.joint_angles[:, pair]
-    first = np.stack([np.ones_like(angles), np.sin(angles), np.cos(angles)], axis=1)
-    products = (first[:, :, None, 0] * first[:, None, :, 1]).reshape(len(inputs), -1)
-    functions = np.hstack([products, np.sin(2.0 * angles), np.cos(2.0 * angles)])
-    return (inputs.jacobian[:, :, moved, None] * functions[:, None, None]).reshape(
+    Returns a (M, 3, 2 n orders) array, lower orders first.
+    """
+    waves = np.repeat(np.exp(1j * inputs.joint_angles)[:, None], orders, axis=1)
+    harmonics = np.cumprod(waves, axis=1)
+    functions = np.stack([harmonics.imag, harmonics.real], axis=2)
+    joint_jacobian = inputs.jacobian[:, :, : inputs.joint_angles.shape[1]]
+    return (joint_jacobian[:, :, None, None] * functions[:, None]).reshape(
         len(inputs), 3, -1
     )
 
 
-def _parts(inputs: Inputs) -> list[slice]:
-    return [slice(first, first + _AT_ONCE) for first in range(0, len(inputs), _AT_ONCE)]
+def compute_pair_columns(
+    inputs: Inputs, pair: tuple[int, int], displaced_joints: np.ndarray
+) -> np.ndarray:
+    """Displacement of the target by functions of two joints' angles.
+
+    The functions are the products of the first harmonics of both angles, and the second
+    harmonics of each. Every one is a deviation of every joint in `displaced_joints`.
+    Returns a (M, 3, D) array.
+    """
+    angles = inputs.joint_angles[:, pair]
+    first = np.stack([np.ones_like(angles), np.sin(angles), np.cos(angles)], axis=1)
+    products = first[:, :, None, 0] * first[:, None, :, 1]
+    functions = np.hstack(
+        [
+            products.reshape(len(inputs), -1),
+            np.sin(2.0 * angles),
+            np.cos(2.0 * angles),
+        ]
+    )
+    displacement = inputs.jacobian[:, :, displaced_joints, None]
+    return (displacement * functions[:, None, None]).reshape(len(inputs), 3, -1)
 
 
-def _stacked(parts: Iterator[np.ndarray]) -> np.ndarray:
-    """Rows of three of all parts, and none of no part."""
-    return np.concatenate([np.zeros((0, 3)), *parts])
+def _split_into_chunks(inputs: Inputs | np.ndarray) -> list[slice]:
+    return [slice(start, start + _CHUNK) for start in range(0, len(inputs), _CHUNK)]
 
 
-def _matern(some: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Matérn's correlation of order 5/2, and the slope by which it falls with half of a
-    squared distance: ndarray (N, M)."""
+def _concatenate(chunks: Iterator[np.ndarray]) -> np.ndarray:
+    """Rows of three columns of all chunks; without chunks there are no rows."""
+    return np.concatenate([np.zeros((0, 3)), *chunks])
+
+
+def _evaluate_matern(
+    inputs: np.ndarray, points: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Matérn correlation of order 5/2 between inputs (N, d) and points (M, d), in units
+    of the lengths, and the negative slope by half of the squared distance: (N, M)."""
     square = (
-        (some**2).sum(axis=1)[:, None] + (others**2).sum(axis=1) - 2.0 * some @ others.T
+        (inputs**2).sum(axis=1)[:, None]
+        + (points**2).sum(axis=1)
+        - 2.0 * inputs @ points.T
     )
     root = np.sqrt(np.maximum(5.0 * square, 0.0))
-    falling = np.exp(-root)
-    slope = (1.0 + root) * falling
-    return slope + root**2 / 3.0 * falling, 5.0 / 3.0 * slope
+    decay = np.exp(-root)
+    slope = (1.0 + root) * decay
+    return slope + root**2 / 3.0 * decay, 5.0 / 3.0 * slope
 
 
-def _surprise(
-    logarithms: np.ndarray, inputs: np.ndarray, standard: np.ndarray
+def _compute_features(
+    points: np.ndarray, inputs: np.ndarray, prior_factor: np.ndarray, variance: float
+) -> np.ndarray:
+    """Covariances of the process at inputs (M, d) with its whitened values at the N
+    inducing points, (N, M) array."""
+    covariance = variance * _evaluate_matern(points, inputs)[0]
+    return lapack.dtrtrs(prior_factor, covariance, lower=1)[0]
+
+
+def _maximize_likelihood(inputs: np.ndarray, residual: np.ndarray) -> _Hyperparameters:
+    """Hyperparameters with the largest marginal likelihood; arguments as in
+    `_negative_log_likelihood`."""
+    from scipy.optimize import Bounds, minimize
+
+    ranges = np.log([_VARIANCE, *[_LENGTH] * inputs.shape[1], _NOISE])
+    # A length at its bound is an input without influence, not a failure.
+    optimum = minimize(
+        _negative_log_likelihood,
+        ranges[:, 0],
+        (inputs, residual),
+        "L-BFGS-B",
+        jac=True,
+        bounds=Bounds(*ranges[:, 1:].T),
+        options={"ftol": _LIKELIHOOD_TOLERANCE},
+    )
+    return _Hyperparameters.from_logarithms(optimum.x)
+
+
+def _negative_log_likelihood(
+    logarithms: np.ndarray, inputs: np.ndarray, residual: np.ndarray
 ) -> tuple[float, np.ndarray]:
-    """Minus the logarithm of a Gaussian process's marginal likelihood, and its
-    gradient: its equations 5.8 and 5.9.
+    """Negative log marginal likelihood of a Gaussian process, and its gradient.
 
-    A length moves the covariance by a product of the slope and squared differences of
-    one input, whose sum over all pairs is a product of matrices.
+    Equations 5.8 and 5.9 of Rasmussen and Williams (see `fit_gaussian_process`). A
+    length changes the covariance by the product of the slope and the squared
+    differences of one input, whose sum over all pairs is a product of matrices.
 
-    `inputs` (N, k). `standard` (N, 3): residuals of mean 0 and size 1.
+    Parameters
+    ----------
+    logarithms : (d + 2,) array, see `_Hyperparameters`
+    inputs : (N, d) array, scaled
+    residual : (N, 3) array, with mean 0 and standard deviation 1
     """
-    variance, *lengths, noise = np.exp(logarithms)
-    (count, axes), scaled = standard.shape, inputs / lengths
-    correlation, slope = _matern(scaled, scaled)
+    hyperparameters = _Hyperparameters.from_logarithms(logarithms)
+    variance = hyperparameters.variance
+    noise = hyperparameters.noise
+    axes = residual.shape[1]
+    scaled = inputs / hyperparameters.lengths
+    correlation, slope = _evaluate_matern(scaled, scaled)
     covariance = variance * correlation
-    covariance[np.diag_indices(count)] = variance + noise + _JITTER
-    lower, failed = lapack.dpotrf(covariance.T, lower=1, overwrite_a=1)
+    covariance[np.diag_indices_from(covariance)] = variance + noise + _JITTER
+    factor, failed = lapack.dpotrf(covariance.T, lower=1, overwrite_a=1)
     if failed:
         return np.inf, np.zeros(len(logarithms))
-    along = lapack.dpotrs(lower, standard, lower=1)[0]
-    value = 0.5 * (standard * along).sum() + axes * (
-        np.log(np.diag(lower)).sum() + 0.5 * count * np.log(2.0 * np.pi)
+    solved = lapack.dpotrs(factor, residual, lower=1)[0]
+    value = 0.5 * (residual * solved).sum() + axes * (
+        np.log(np.diag(factor)).sum() + 0.5 * len(residual) * np.log(2.0 * np.pi)
     )
-    inverse = -axes * invert_cholesky_factor(lower)
-    inverse += along @ along.T
-    of_noise = noise * np.trace(inverse)
-    of_variance = variance * np.vdot(inverse.T, correlation)
+    # Derivative of the log likelihood by the covariance, times two.
+    inverse = -axes * invert_cholesky_factor(factor)
+    inverse += solved @ solved.T
     slope *= inverse
-    of_lengths = (
-        2.0
-        * variance
-        * (slope.sum(axis=1) @ scaled**2 - (scaled * (slope @ scaled)).sum(axis=0))
-    )
-    return float(value), -0.5 * np.array([of_variance, *of_lengths, of_noise])
+    by_lengths = slope.sum(axis=1) @ scaled**2 - (scaled * (slope @ scaled)).sum(axis=0)
+    gradient = [
+        variance * np.vdot(inverse.T, correlation),
+        *(2.0 * variance * by_lengths),
+        noise * np.trace(inverse),
+    ]
+    return float(value), -0.5 * np.array(gradient)

@@ -1,23 +1,28 @@
-"""Whether what a fitted model leaves is a function of the joints: one test, by poses
-that are left out.
+"""Test whether the residual of a fitted model is a function of the joint angles.
 
-A posterior predictive check [1] whose discrepancy is how well ridge regressions on
-functions of the joint angles, fitted to the residuals of most configurations, predict
-those of the others. Residuals are no independent errors: the fit has taken out of them
-what its parameters can follow, and its priors have left in them what these hold back.
-So chance is errors of changing sign, one sign for each configuration (the cluster
-bootstrap of residuals [2]), and parameters drawn from their priors, both carried
-through the same fit. Each configuration keeps its size of error and all that its
-measurements share; no noise need be known.
+The test is a posterior predictive check [1]_. Its discrepancy says how well ridge
+regressions on functions of the joint angles, fitted to the residuals of most
+configurations, predict the residuals of the other configurations.
 
-[1] Gelman, A., Meng, X.-L. and Stern, H., Posterior predictive assessment of model fitness via realized discrepancies,
-    Statistica Sinica 6, 1996.
-[2] Cameron, A. C., Gelbach, J. B. and Miller, D. L., Bootstrap-based improvements for inference with clustered errors, Review
-    of Economics and Statistics 90, 2008.
+Residuals are not independent errors: the fit has removed what its parameters can
+follow, and its priors have left what they do not allow. Chance is therefore simulated
+by residuals with random signs, one for each configuration (the cluster bootstrap of
+residuals [2]_), and by parameters that are drawn from their priors. Both pass through
+the same fit. Each configuration keeps the size of its errors and everything that its
+measurements share, so that the noise need not be known.
+
+References
+----------
+.. [1] Gelman, Meng and Stern, Posterior predictive assessment of model fitness via
+   realized discrepancies, Statistica Sinica 6, 1996.
+.. [2] Cameron, Gelbach and Miller, Bootstrap-based improvements for inference with
+   clustered errors, Review of Economics and Statistics 90, 2008.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
 from typing import TYPE_CHECKING
@@ -28,6 +33,7 @@ from elastocal.campaigns.holdout import SAME_POSE_RAD, number_configurations
 from elastocal.fitting.least_squares import INTERMEDIATE_TOLERANCE, fit_model
 from elastocal.fitting.observations import index_poses, sample_observations
 from elastocal.residual_model.regressions import (
+    Inputs,
     compute_harmonic_columns,
     compute_pair_columns,
 )
@@ -39,188 +45,327 @@ from elastocal.residual_model.selection import (
 from elastocal.verdict import RepeatableResidual
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.observations import Observations
-    from elastocal.residual_model.regressions import Inputs
 
-# How often something repeatable is said to remain where only chance does.
+# Functions of the joints: (M, 3, D) displacements of the targets of M observations.
+Basis = Callable[[Inputs], np.ndarray]
+
+# Level of the test: how often it rejects if the residual is chance alone.
 LEVEL = 0.01
 _FOLDS = 5
+# Number of simulated data sets.
 _DRAWS = 299
-_MOST_OBSERVATIONS = 10_000
-# Functions of a kind, as many as configurations within these; joints that functions of
-# two angles move.
-_FEWEST = 60
-_MOST = 240
-_MOVED = 3
-# Penalties, in mean squares of a function: from strong errors of few functions to weak
-# ones of many.
+_MAX_OBSERVATIONS = 10_000
+# A basis has as many functions as there are configurations, within these bounds.
+_MIN_FUNCTIONS = 60
+_MAX_FUNCTIONS = 240
+# Functions of two angles displace this many joints, those that move the targets most.
+_DISPLACED_JOINTS = 3
+# Ridge penalties in mean squares of a basis function: a small one suits strong errors
+# that few functions describe, a large one suits weak errors of many functions.
 _PENALTIES = (0.1, 1.0, 10.0)
-# Angles over which a function of all joints changes, in standard deviations of each.
+# Length over which a smooth function of all joints changes, in standard deviations of
+# the joint angles.
 _LENGTH = 2.0
 
 
 def detect_repeatable_residual(
     fitted: Fit, observations: Observations, seed: int
 ) -> RepeatableResidual | None:
-    """Test whether a fitted model leaves something that is a function of the joints.
+    """Test whether the residual of a fitted model is a function of the joint angles.
 
-    `observations`: which it was fitted to. `seed`: of signs, folds and functions. None
-    with too few configurations.
+    Parameters
+    ----------
+    fitted : Fit
+    observations : the observations of the fit
+    seed : of the signs, folds and basis functions
+
+    Returns
+    -------
+    RepeatableResidual or None
+        None with too few configurations.
     """
-    some = sample_observations(observations, _MOST_OBSERVATIONS)
-    if len(some) < len(observations):
+    sample = sample_observations(observations, _MAX_OBSERVATIONS)
+    if len(sample) < len(observations):
         fitted = fit_model(
             fitted.model,
-            some,
+            sample,
             fitted.noise,
             fitted.estimate,
             reweight_first_step=True,
             tolerance=INTERMEDIATE_TOLERANCE,
         )
-    group = number_configurations(some.states.joint_angles, index_poses(some.states))[
-        some.cluster
-    ]
-    count = int(group.max()) + 1
-    draws = np.random.default_rng(seed)
-    if count < MIN_CONFIGURATIONS:
+    pose = index_poses(sample.states)
+    configuration = number_configurations(sample.states.joint_angles, pose)
+    if configuration.max() + 1 < MIN_CONFIGURATIONS:
         return None
-    fold = draws.permutation(count) % _FOLDS
-    inputs = build_geometric_inputs(fitted.model, fitted.estimate, some)
-    kinds = _kinds(inputs, int(np.clip(count, _FEWEST, _MOST)), draws)
-    sizes = [kind(inputs.select(slice(1))).shape[2] for kind in kinds]
+    stream = np.random.default_rng(seed)
+    models = _fit_models(fitted, sample, configuration[sample.cluster], stream)
+    scores = np.stack([model.scores for model in models])
+    mean = scores[:, 1:].mean(axis=1, keepdims=True)
+    scores = (scores - mean) / scores[:, 1:].std(axis=1, keepdims=True)
+    # One p-value for all models: the largest score of the data among the largest scores
+    # of the simulated data sets.
+    largest = scores.max(axis=0)
+    p_value = float((largest >= largest[0]).mean())
+    best = models[np.argmax(scores[:, 0])]
+    gain = estimate_gain(*best.sum_predictions(), len(sample), _FOLDS)
+    return RepeatableResidual(
+        p_value, bool(p_value <= LEVEL), gain.rms_m, gain.rms_std_error_m
+    )
+
+
+@dataclass
+class _BasisProducts:
+    """Accumulates products of the D functions of a basis, over blocks of M observations.
+
+    Attributes
+    ----------
+    basis : Basis
+    configuration : (M,) int array, configuration of each observation, 0 .. G-1
+    fold : (G,) int array, fold of each configuration, 0 .. K-1
+    residual : (G, D) array, products with the residuals of each configuration
+    gram : (K, D, D) array, Gram matrix of each fold
+    sensitivity : (K, D, P) array, products with the sensitivities of each fold
+    """
+
+    basis: Basis
+    configuration: np.ndarray
+    fold: np.ndarray
+    residual: np.ndarray
+    gram: np.ndarray
+    sensitivity: np.ndarray
+
+    def add(
+        self,
+        block: slice,
+        inputs: Inputs,
+        weight: np.ndarray,
+        residual: np.ndarray,
+        sensitivities: np.ndarray,
+    ) -> None:
+        """Add a block of observations.
+
+        `weight` (M, 1, 1) is the square root of the robust weight. Sensitivities
+        (M, 3, P) are weighted, residuals (M, 3) are not.
+        """
+        configuration = self.configuration[block]
+        functions = weight * self.basis(inputs)
+        products = (functions * weight * residual[:, :, None]).sum(axis=1)
+        np.add.at(self.residual, configuration, products)
+        for number in range(_FOLDS):
+            members = self.fold[configuration] == number
+            rows = functions[members].reshape(-1, functions.shape[2])
+            self.gram[number] += rows.T @ rows
+            # Explicit sizes, because a block may hold no member and a model no parameter.
+            size = len(rows), self.sensitivity.shape[2]
+            self.sensitivity[number] += rows.T @ sensitivities[members].reshape(size)
+
+
+@dataclass(frozen=True)
+class _Chance:
+    """N simulated data sets of G configurations.
+
+    Attributes
+    ----------
+    factor : (N, G) array, by which the residuals of each configuration are multiplied
+    parameters : (N, P) array, change of the fitted parameters
+    """
+
+    factor: np.ndarray
+    parameters: np.ndarray
+
+
+@dataclass(frozen=True)
+class _CrossValidatedModel:
+    """Ridge regressions on one basis with one penalty, each fitted without a fold.
+
+    Attributes
+    ----------
+    products : _BasisProducts
+    scores : (1 + N,) array, products of left-out residuals and predictions over the norm
+        of the predictions: of the data, then of the simulated data sets
+    coefficients : (K, D) array, fitted to the data without each fold
+    """
+
+    products: _BasisProducts
+    scores: np.ndarray
+    coefficients: np.ndarray
+
+    def sum_predictions(self) -> tuple[np.ndarray, np.ndarray]:
+        """Products (G,) of the predictions with the residuals of each configuration, and
+        with themselves, averaged over the configurations, m²."""
+        fold = self.products.fold
+        square = np.einsum(
+            "kd,kde,ke", self.coefficients, self.products.gram, self.coefficients
+        )
+        with_residual = (self.products.residual * self.coefficients[fold]).sum(axis=1)
+        return with_residual, np.full(len(fold), square / len(fold))
+
+
+def _fit_models(
+    fitted: Fit,
+    observations: Observations,
+    configuration: np.ndarray,
+    stream: np.random.Generator,
+) -> list[_CrossValidatedModel]:
+    """Fit all models of the residual to the data and to simulated data sets."""
+    count = int(configuration.max()) + 1
     parameters = len(fitted.unidentifiable)
-    # Of each kind of functions the products with residuals by configurations, with
-    # themselves and with sensitivities by folds.
-    sums = [
-        [np.zeros(s) for s in ((count, n), (_FOLDS, n, n), (_FOLDS, n, parameters))]
-        for n in sizes
-    ]
-    followed = np.zeros((count, parameters))
-    leverage = np.zeros(count)
+    fold = stream.permutation(count) % _FOLDS
+    inputs = build_geometric_inputs(fitted.model, fitted.estimate, observations)
+    size = int(np.clip(count, _MIN_FUNCTIONS, _MAX_FUNCTIONS))
+    products = []
+    for basis in _choose_bases(inputs, size, stream):
+        functions = basis(inputs.select(slice(1))).shape[2]
+        products.append(
+            _BasisProducts(
+                basis,
+                configuration,
+                fold,
+                np.zeros((count, functions)),
+                np.zeros((_FOLDS, functions, functions)),
+                np.zeros((_FOLDS, functions, parameters)),
+            )
+        )
     white_residual = fitted.whiten(fitted.residual)
     weight = np.sqrt(fitted.weights)[:, None, None]
-    for seen, plain, white in fitted.iterate_sensitivities(some):
-        mine = group[seen]
-        w = weight[seen]
-        there = inputs.select(seen)
-        np.add.at(followed, mine, np.einsum("mrp,mr->mp", white, white_residual[seen]))
-        flat = white.reshape(len(white) * white.shape[1], parameters)
-        spread = ((flat @ fitted.covariance) * flat).sum(axis=1)
-        np.add.at(leverage, mine, spread.reshape(white.shape[:2]).mean(axis=1))
-        parts = [fold[mine] == k for k in range(_FOLDS)]
-        slopes = [
-            (w[part] * plain[part, :3]).reshape(3 * part.sum(), parameters)
-            for part in parts
-        ]
-        for kind, (along, gram, across) in zip(kinds, sums, strict=True):
-            functions = w * kind(there)
-            np.add.at(
-                along,
-                mine,
-                (functions * w * fitted.residual[seen, :3, None]).sum(axis=1),
-            )
-            for k, part in enumerate(parts):
-                rows = functions[part].reshape(-1, functions.shape[2])
-                gram[k] += rows.T @ rows
-                across[k] += rows.T @ slopes[k]
-    # A configuration that the fit follows has errors larger than its residuals.
-    free = np.maximum(1.0 - leverage / np.bincount(group), 1.0 / count)
-    signs = draws.choice([-1.0, 1.0], (_DRAWS, count)) / np.sqrt(free)
-    held_back = draws.normal(size=(_DRAWS, parameters)) / fitted.prior_std
-    moved = (held_back - signs @ followed) @ fitted.covariance
-    judged = []
-    for along, gram, across in sums:
-        of_folds = [
-            (along[fold == k], signs[:, fold == k], across[k]) for k in range(_FOLDS)
-        ]
-        right = np.stack(
-            [
-                np.vstack([own.sum(axis=0), sign @ own + moved @ other.T])
-                for own, sign, other in of_folds
-            ]
+    gradient = np.zeros((count, parameters))
+    leverage = np.zeros(count)
+    for block, sensitivities, whitened in fitted.iterate_sensitivities(observations):
+        np.add.at(
+            gradient,
+            configuration[block],
+            np.einsum("mrp,mr->mp", whitened, white_residual[block]),
         )
-        for score, coefficients in _left_out(gram, right):
-            square = np.einsum("kd,kde,ke", coefficients, gram, coefficients) / count
-            judged.append(
-                (
-                    score,
-                    (along * coefficients[fold]).sum(axis=1),
-                    np.full(count, square),
-                )
+        np.add.at(
+            leverage,
+            configuration[block],
+            _compute_leverage(whitened, fitted.covariance),
+        )
+        for basis_products in products:
+            basis_products.add(
+                block,
+                inputs.select(block),
+                weight[block],
+                fitted.residual[block, :3],
+                weight[block] * sensitivities[:, :3],
             )
-    scores = np.stack([score for score, *_ in judged])
-    scores = (scores - scores[:, 1:].mean(axis=1, keepdims=True)) / scores[:, 1:].std(
-        axis=1, keepdims=True
-    )
-    best, (_, of_residual, of_itself) = (
-        scores.max(axis=0),
-        judged[np.argmax(scores[:, 0])],
-    )
-    p_value = float((best >= best[0]).mean())
-    gain = estimate_gain(of_residual, of_itself, len(some), _FOLDS)
-    return RepeatableResidual(
-        p_value, bool(p_value <= LEVEL), gain["rms_m"], gain["rms_std_error_m"]
-    )
+    leverage /= np.bincount(configuration)
+    chance = _draw_chance(fitted, gradient, leverage, stream)
+    return [
+        model
+        for basis_products in products
+        for model in _cross_validate(basis_products, chance)
+    ]
 
 
-def _kinds(
-    inputs: Inputs, most: int, draws: np.random.Generator
-) -> list[Callable[[Inputs], np.ndarray]]:
-    """Functions of the joints, each kind (M, 3, D): waves of each joint as its
-    deviations; displacements that are smooth in all joints together (random Fourier
-    features [1]); and of each two joints' angles, deviations of those joints that move
-    the targets most.
+def _compute_leverage(sensitivities: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """Mean leverage of the rows of each observation, (M,) array, from its whitened
+    sensitivities (M, rows, P)."""
+    count, rows, parameters = sensitivities.shape
+    flat = sensitivities.reshape(count * rows, parameters)
+    leverage = ((flat @ covariance) * flat).sum(axis=1)
+    return leverage.reshape(count, rows).mean(axis=1)
 
-    [1] Rahimi, A. and Recht, B., Random features for large-scale kernel machines,
-    NeurIPS 20, 2007.
+
+def _choose_bases(
+    inputs: Inputs, functions: int, stream: np.random.Generator
+) -> list[Basis]:
+    """Choose bases of about so many functions of the joint angles.
+
+    Harmonics of each joint's angle as its deviations; displacements that are smooth in
+    all joints together (random Fourier features [1]_); and, for each pair of joints,
+    functions of both angles as deviations of the joints that move the targets most.
+
+    References
+    ----------
+    .. [1] Rahimi and Recht, Random features for large-scale kernel machines, NeurIPS 20,
+       2007.
     """
     joints = inputs.joint_angles.shape[1]
     spread = np.maximum(inputs.joint_angles.std(axis=0), SAME_POSE_RAD)
-    turns = draws.normal(size=(joints, most)) / (_LENGTH * spread[:, None])
-    axes = np.eye(3)[np.arange(most) % 3].T
-    phases = draws.uniform(0.0, 2.0 * np.pi, most)
-    moved = np.argsort(
-        -(inputs.jacobian[:, :, :joints] ** 2).sum(axis=(0, 1)), kind="stable"
-    )[:_MOVED]
-    return [
-        lambda some: compute_harmonic_columns(some, max(1, most // (2 * joints))),
-        lambda some: axes * np.cos(some.joint_angles @ turns + phases)[:, None],
-        *(
-            partial(compute_pair_columns, pair=pair, moved=moved)
-            for pair in combinations(range(joints), 2)
-        ),
+    frequencies = stream.normal(size=(joints, functions)) / (_LENGTH * spread[:, None])
+    axes = np.eye(3)[np.arange(functions) % 3].T
+    phases = stream.uniform(0.0, 2.0 * np.pi, functions)
+    squares = (inputs.jacobian[:, :, :joints] ** 2).sum(axis=(0, 1))
+    displaced = np.argsort(-squares, kind="stable")[:_DISPLACED_JOINTS]
+    orders = max(1, functions // (2 * joints))
+
+    def smooth(block: Inputs) -> np.ndarray:
+        return axes * np.cos(block.joint_angles @ frequencies + phases)[:, None]
+
+    pairs = [
+        partial(compute_pair_columns, pair=pair, displaced_joints=displaced)
+        for pair in combinations(range(joints), 2)
     ]
+    return [partial(compute_harmonic_columns, orders=orders), smooth, *pairs]
 
 
-def _left_out(
-    gram: np.ndarray, right: np.ndarray
-) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Ridge regression of each fold by the others: products of residuals with
-    predictions over the size of these.
+def _draw_chance(
+    fitted: Fit,
+    gradient: np.ndarray,
+    leverage: np.ndarray,
+    stream: np.random.Generator,
+) -> _Chance:
+    """Draw signs for the residuals of configurations, and parameters from their priors,
+    and carry both through the fit.
 
-    `gram` (K, D, D). `right` (K, N, D): products of functions with N sets of residuals.
-    Yields (N,) for each penalty, and the coefficients (K, D) of the first set.
+    `gradient` (G, P): products of whitened sensitivities and residuals of each
+    configuration. `leverage` (G,): its mean leverage.
     """
-    rest = []
-    for mine, own in zip(gram, right, strict=True):
-        values, vectors = np.linalg.eigh(gram.sum(axis=0) - mine)
-        rest.append(
-            (
-                np.maximum(values, 0.0),
-                values.mean(),
-                vectors,
-                (right.sum(axis=0) - own) @ vectors,
-                own @ vectors,
-            )
+    count, parameters = gradient.shape
+    # The fit follows a configuration with a large leverage, so that its errors are
+    # larger than its residuals.
+    residual_share = np.maximum(1.0 - leverage, 1.0 / count)
+    signs = stream.choice([-1.0, 1.0], (_DRAWS, count)) / np.sqrt(residual_share)
+    prior_term = stream.normal(size=(_DRAWS, parameters)) / fitted.prior_std
+    return _Chance(signs, (prior_term - signs @ gradient) @ fitted.covariance)
+
+
+def _cross_validate(
+    products: _BasisProducts, chance: _Chance
+) -> Iterator[_CrossValidatedModel]:
+    """Predict each fold by a ridge regression on the other folds, for each penalty.
+
+    The regressions are solved along the principal axes of the Gram matrix of the other
+    folds.
+    """
+    projections = np.stack(
+        [_project_residuals(products, chance, number) for number in range(_FOLDS)]
+    )
+    folds = []
+    for gram, projection in zip(products.gram, projections, strict=True):
+        eigenvalues, axes = np.linalg.eigh(products.gram.sum(axis=0) - gram)
+        training = (projections.sum(axis=0) - projection) @ axes
+        mean = eigenvalues.mean()
+        folds.append(
+            (np.maximum(eigenvalues, 0.0), mean, axes, training, projection @ axes)
         )
     for penalty in _PENALTIES:
-        (along, square), coefficients = np.zeros((2, right.shape[1])), []
-        for values, mean, vectors, others, own in rest:
-            shrunk = others / (values + penalty * mean)
-            along += (own * shrunk).sum(axis=1)
-            square += (values * shrunk**2).sum(axis=1)
-            coefficients.append(vectors @ shrunk[0])
-        yield along / np.sqrt(square), np.stack(coefficients)
+        with_residual, square = np.zeros((2, 1 + _DRAWS))
+        coefficients = []
+        for eigenvalues, mean, axes, training, left_out in folds:
+            shrunk = training / (eigenvalues + penalty * mean)
+            with_residual += (left_out * shrunk).sum(axis=1)
+            square += (eigenvalues * shrunk**2).sum(axis=1)
+            coefficients.append(axes @ shrunk[0])
+        scores = with_residual / np.sqrt(square)
+        yield _CrossValidatedModel(products, scores, np.stack(coefficients))
+
+
+def _project_residuals(
+    products: _BasisProducts, chance: _Chance, number: int
+) -> np.ndarray:
+    """Products (1 + N, D) of a basis in one fold with the residuals of the data and of
+    the simulated data sets."""
+    members = products.fold == number
+    residual = products.residual[members]
+    simulated = (
+        chance.factor[:, members] @ residual
+        + chance.parameters @ products.sensitivity[number].T
+    )
+    return np.vstack([residual.sum(axis=0), simulated])

@@ -1,20 +1,23 @@
-"""A regression on what a fitted model leaves, chosen by its training poses, and what
-both make of poses that no fit has seen.
+"""Choose a regression on the residuals of a fitted model, and validate both on poses
+that no fit has seen.
 
-The best of many settings is a winner by luck. So each outer fold of the training poses
-is predicted by what the others choose among themselves and fit (nested cross-validation
-[1]), and those predictions decide whether anything is corrected, by one test over
-configurations, and how much of the correction is kept, by a slope of at most one.
+The best of many settings is the best partly by luck. Each outer fold of the training
+poses is therefore predicted by a regression that the other folds choose among
+themselves and fit (nested cross-validation [1]_). These predictions decide whether
+anything is corrected, by one test over configurations, and how much of the correction
+is kept, by a slope of at most one.
 
-[1] Varma, S. and Simon, R., Bias in error estimation when using cross-validation for model selection, BMC Bioinformatics 7,
-    2006.
+References
+----------
+.. [1] Varma and Simon, Bias in error estimation when using cross-validation for model
+   selection, BMC Bioinformatics 7, 2006.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import stdtr
@@ -41,297 +44,331 @@ from elastocal.validation.transfer import (
     is_same_campaign,
     transfer_fit,
 )
+from elastocal.verdict import (
+    CrossValidatedGain,
+    ErrorSummary,
+    HalfWidths,
+    RegressionChoice,
+    Remainder,
+    Spread,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.observations import Observations, States
+    from elastocal.residual_model.regressions import Setting
 
 CONFIDENCE = 0.95
 # Half width of the interval that holds 95 % of a normal distribution, in standard
 # deviations.
 NORMAL_QUANTILE = 1.959964
-# How often a regression is chosen where nothing is left. A few configurations leave the
-# outer folds' fits so unlike the final one that they must be surer; of fewer yet, a
-# fold of a fold leaves nothing to regress.
+# Level of the test that a regression must pass: how often one is chosen if the residual
+# is noise. With few configurations, the fits of the outer folds differ so much from the
+# final one that the test must be stricter; with even fewer, a fold of a fold leaves
+# nothing to fit.
 _LEVEL = 0.05
-_LEVEL_OF_FEW = 0.01
-_FEW = 40
+_STRICT_LEVEL = 0.01
+_FEW_CONFIGURATIONS = 40
 MIN_CONFIGURATIONS = 10
-# A regression is chosen by so many observations at most; the quantile that scales its
-# intervals they fix to two per cent. It is fitted to so many: of a million a process
-# takes eight minutes, and its 2,000 values have been determined by far fewer.
 _FOLDS = 5
-_MOST_TO_CHOOSE = 2_000
-_MOST_TO_FIT = 10_000
+# Upper bound on the observations that choose a regression: they determine the quantile
+# that scales its intervals to two per cent.
+_MAX_TO_CHOOSE = 2_000
+# Upper bound on the observations of the final fit: a process takes eight minutes for a
+# million, and far fewer determine its 2,000 values.
+_MAX_TO_FIT = 10_000
 _REPLICATES = 1000
-# Share of a joint's fitted range beside it within which a regression is added too: no
-# pose has neighbours that near, and of poses drawn like 200 fitted ones some 3 % would
-# go without for standing a hundredth beyond.
-_BESIDE = 0.05
-# A usual size of an effect is as easily taken back as so much of a joint is added.
-_RAD_OF_A_SIZE = 1e-3
-# What no command states, as `effects.conditions.find_offered_needs` names it.
-_NOT_STATED = {"approach", "time", "temperature"}
+# Margin beyond a joint's fitted range within which a regression is still added, as a
+# share of the range. No pose has neighbours that close, and without a margin some 3 % of
+# poses drawn like 200 fitted ones would be excluded for a hundredth of the range.
+_RANGE_MARGIN = 0.05
+# Ridge regression shrinks the correction of an effect of plausible size like so large a
+# deviation of a joint.
+_RAD_PER_SIZE = 1e-3
+# Conditions that no command states, named as in `effects.conditions`.
+_NOT_COMMANDED = {"approach", "time", "temperature"}
+
+
+@dataclass(frozen=True)
+class ResidualModelPlan:
+    """How a regression on residuals is chosen and applied.
+
+    Attributes
+    ----------
+    regression : str
+        Its name; `BEST_REMAINDER` chooses the regression that predicts left-out poses
+        best.
+    blocks : bool
+        Whether folds are blocks of joint space, for poses far from the fitted ones;
+        otherwise folds are random.
+    within_range : bool
+        Whether nothing is corrected beyond the fitted joint angles and loads.
+    seed : int
+    """
+
+    regression: str
+    blocks: bool
+    within_range: bool
+    seed: int
 
 
 @dataclass(frozen=True)
 class CorrectedResiduals:
-    """What a model and a regression leave of poses that they have not seen; arrays of
-    M.
+    """Residuals of a model and a regression at M observations that neither has seen.
 
-    `residual` (M, 3): measured less predicted positions, m, base axes. `std` (M, 3):
-    standard deviation stated for them, m. `outside` (M,) of bool: beyond the joint
-    angles or loads that were fitted. `chosen`: facts of `tuned`. `predictor`: of what
-    is left. `std` and `predictor` are None where nothing is corrected.
+    Attributes
+    ----------
+    residual : (M, 3) array, measured minus predicted positions, m, base axes
+    std : (M, 3) array or None
+        Stated standard deviation, m; None if nothing is corrected.
+    outside : (M,) bool array, beyond the fitted joint angles or loads
+    choice : RegressionChoice
+    predictor : Predictor or None
+        Of the residuals of the physical model; None if nothing is corrected.
     """
 
     residual: np.ndarray
     std: np.ndarray | None
     outside: np.ndarray
-    chosen: Mapping[str, Any]
+    choice: RegressionChoice
     predictor: Predictor | None
 
 
 def validate_residual_model(
-    fitted: Fit,
-    case: Case,
-    held_out: Case,
-    regression: str,
-    *,
-    blocks: bool,
-    within_range: bool,
-    seed: int,
+    fitted: Fit, case: Case, held_out: Case, plan: ResidualModelPlan
 ) -> CorrectedResiduals:
-    """Predict held-out poses by a model and a regression on what it leaves of the
-    training poses.
+    """Predict held-out poses by a model and a regression on its training residuals.
 
-    Whether there is one, its setting, size and intervals come from cross-validation of
-    the training poses, with the model fitted anew without each fold. Poses of another
-    campaign have their frames and targets fitted to what both leave of them.
+    Cross-validation of the training poses, with the model refitted without each fold,
+    decides whether there is a regression, its setting, size and intervals. If another
+    campaign is held out, its frames and targets are fitted to the residuals of both.
 
-    `fitted`: to the training poses. `case`: of the training poses. `regression`: its
-    name; `BEST_REMAINDER` for that which left-out poses choose. `blocks`: whether folds
-    are blocks of joint space, as for poses far from those fitted; else they are random.
-    `within_range`: whether nothing is corrected beyond the joint angles and loads that
-    were fitted.
+    Parameters
+    ----------
+    fitted : Fit to the training poses
+    case : Case of the training poses
+    held_out : Case
+    plan : ResidualModelPlan
     """
-    there, (model, estimate) = (
-        held_out.observations,
-        transfer_fit(fitted, case, held_out),
-    )
-    names = [
-        name for name in list_regressions() if regression in (name, BEST_REMAINDER)
-    ]
-    every = case.observations
-    some = sample_observations(case.observations, _MOST_TO_CHOOSE)
-    inputs = build_inputs(fitted.model, fitted.estimate, some)
-    chosen = _chosen(fitted, some, inputs, names, blocks, seed)
+    observations = held_out.observations
+    states = observations.states
+    model, estimate = transfer_fit(fitted, case, held_out)
+    choice = _choose_on_training(fitted, case.observations, plan)
     outside = find_beyond_regression(
-        every.states, there.states.joint_angles, there.states.wrench
-    )[there.state]
-    mean = np.zeros((len(there), 3))
+        case.observations.states, states.joint_angles, states.wrench
+    )[observations.state]
+    mean = np.zeros((len(observations), 3))
     std = None
     predictor = None
-    if chosen["regression"]:
-        predictor = fit_to_observations(chosen, fitted.model, fitted.estimate, every)
-        asked = build_inputs(
-            model, estimate, there, list_regressions()[chosen["regression"]].by_jacobian
+    if choice.regression:
+        predictor = fit_to_observations(
+            choice, fitted.model, fitted.estimate, case.observations
         )
-        mean = np.where(outside[:, None] & within_range, 0.0, predictor.mean(asked))
-        std = predictor.std(asked)
+        inputs = build_inputs(
+            model,
+            estimate,
+            observations,
+            with_jacobian=list_regressions()[choice.regression].uses_jacobian,
+        )
+        excluded = outside[:, None] & plan.within_range
+        mean = np.where(excluded, 0.0, predictor.mean(inputs))
+        std = predictor.std(inputs)
     if not is_same_campaign(case, held_out):
-        session = np.searchsorted(estimate.sessions, there.states.session[there.state])
-        moved = (
-            there.position
-            - (estimate.frame_rotation[session] @ mean[..., None])[..., 0]
-        )
-        known = replace(fitted, model=model, estimate=estimate)
-        estimate = fit_placement(known, model, replace(there, position=moved))
-    return CorrectedResiduals(
-        compute_position_residuals(model, estimate, there) - mean,
-        std,
-        outside,
-        chosen,
-        predictor,
+        transferred = replace(fitted, model=model, estimate=estimate)
+        estimate = _refit_placement(transferred, observations, mean)
+    residual = compute_position_residuals(model, estimate, observations) - mean
+    return CorrectedResiduals(residual, std, outside, choice, predictor)
+
+
+def _refit_placement(
+    fitted: Fit, observations: Observations, correction: np.ndarray
+) -> Estimate:
+    """Fit frames and targets to the residuals that a correction (M, 3), m, leaves."""
+    states = observations.states
+    session = np.searchsorted(
+        fitted.estimate.sessions, states.session[observations.state]
     )
+    rotation = fitted.estimate.frame_rotation[session]
+    position = observations.position - (rotation @ correction[..., None])[..., 0]
+    return fit_placement(fitted, fitted.model, replace(observations, position=position))
 
 
 def is_commanded(effect: Candidate) -> bool:
-    """Whether a correction contains an effect: one that moves the robot, by what a
-    command states."""
-    return moves_robot(effect) and effect.needs.isdisjoint(_NOT_STATED)
+    """Whether a correction contains an effect: it moves the robot, and a command states
+    the conditions on which it depends."""
+    return moves_robot(effect) and effect.needs.isdisjoint(_NOT_COMMANDED)
 
 
 def find_beyond_regression(
     fitted: States, joint_angles: np.ndarray, wrench: np.ndarray | None
 ) -> np.ndarray:
-    """Where no regression is added, ndarray of bool (N,): beyond the loads that were
-    fitted, and joint angles with a margin.
+    """Find the states at which no regression is added.
 
-    `joint_angles` (N, n): of the chain, rad. `wrench` (N, 6): N, N m; None for none.
+    They lie beyond the fitted loads, or beyond the fitted joint angles with a margin.
+
+    Parameters
+    ----------
+    fitted : States
+    joint_angles : (N, n) array, angles of the chain, rad
+    wrench : (N, 6) array, N and N m; None without loads
+
+    Returns
+    -------
+    (N,) bool array
     """
     low = fitted.joint_angles.min(axis=0)
     high = fitted.joint_angles.max(axis=0)
     middle = 0.5 * (low + high)
-    return find_beyond_campaign(
-        fitted, middle + (joint_angles - middle) / (1.0 + 2.0 * _BESIDE), wrench
-    )
-
-
-def _chosen(
-    fitted: Fit,
-    observations: Observations,
-    inputs: Inputs,
-    names: Sequence[str],
-    blocks: bool,
-    seed: int,
-) -> dict[str, Any]:
-    """As `tuned`, of training poses in folds, with the model fitted anew without
-    each."""
-    states = observations.states
-    model = fitted.model
-    pose = index_poses(states)
-    each = observations.cluster
-    configuration = number_configurations(states.joint_angles, pose)
-    count = min(_FOLDS, configuration.max() + 1)
-    shuffled = (
-        np.random.default_rng(seed).permutation(configuration.max() + 1)[configuration]
-        % count
-    )
-    fold = partition_poses(states.joint_angles, pose, count) if blocks else shuffled
-    without = np.stack(
-        [
-            compute_position_residuals(model, other, observations)
-            for other in refit_without_folds(fitted, observations, fold[pose])
-        ]
-    )
-    whole = compute_position_residuals(model, fitted.estimate, observations)
-    return choose_regression(
-        names, inputs, configuration[each], fold[each], whole, without, seed
-    )
+    shrunk = middle + (joint_angles - middle) / (1.0 + 2.0 * _RANGE_MARGIN)
+    return find_beyond_campaign(fitted, shrunk, wrench)
 
 
 def fit_to_observations(
-    chosen: Mapping[str, Any],
+    choice: RegressionChoice,
     model: Model,
     estimate: Estimate,
     observations: Observations,
 ) -> Predictor:
-    """`fitted_again`, to what a model leaves of its training poses."""
-    some = sample_observations(observations, _MOST_TO_FIT)
-    by_jacobian = list_regressions()[chosen["regression"]].by_jacobian
-    return fitted_again(
-        chosen,
-        build_inputs(model, estimate, some, by_jacobian),
-        compute_position_residuals(model, estimate, some),
+    """Fit a chosen regression to the residuals of a model at its training poses."""
+    sample = sample_observations(observations, _MAX_TO_FIT)
+    inputs = build_inputs(
+        model,
+        estimate,
+        sample,
+        with_jacobian=list_regressions()[choice.regression].uses_jacobian,
+    )
+    return fit_choice(
+        choice, inputs, compute_position_residuals(model, estimate, sample)
     )
 
 
-def fitted_again(
-    chosen: Mapping[str, Any], inputs: Inputs, residual: np.ndarray
+def fit_choice(
+    choice: RegressionChoice, inputs: Inputs, residual: np.ndarray
 ) -> Predictor:
-    """The regression of facts of `tuned`, fitted to residuals (M, 3), shrunk, with
-    intervals as wide as poses left out say."""
-    fitted = list_regressions()[chosen["regression"]].fitted
-    spread = chosen["spread"]
-    found = next(fitted(inputs, residual, [chosen["setting"]], chosen["seed"]))
+    """Fit a chosen regression to residuals (M, 3), m.
 
-    def std(there: Inputs) -> np.ndarray:
-        stated = (
-            np.nan if spread["times"] is None else spread["times"] * found.std(there)
-        )
-        return np.where(
-            np.isfinite(stated), stated, np.full((len(there), 3), spread["otherwise_m"])
-        )
-
-    return Predictor(
-        lambda there: chosen["left_out"]["factor"] * found.mean(there), std
+    Its predictions are shrunk, and its intervals scaled, as left-out poses require.
+    """
+    spread = choice.spread
+    assert spread is not None, "no regression was chosen"
+    assert choice.left_out is not None and choice.setting is not None
+    shrinkage = choice.left_out.factor
+    std_factor = np.nan if spread.times is None else spread.times
+    predictor = _fit_setting(
+        choice.regression, choice.setting, inputs, residual, choice.seed
     )
+
+    def mean(queries: Inputs) -> np.ndarray:
+        return shrinkage * predictor.mean(queries)
+
+    def std(queries: Inputs) -> np.ndarray:
+        stated = std_factor * predictor.std(queries)
+        return np.where(np.isfinite(stated), stated, spread.otherwise_m)
+
+    return Predictor(mean, std)
+
+
+def _fit_setting(
+    name: str, setting: Setting, inputs: Inputs, residual: np.ndarray, seed: int
+) -> Predictor:
+    return next(list_regressions()[name].fit(inputs, residual, [setting], seed))
 
 
 def build_geometric_inputs(
     model: Model,
     estimate: Estimate,
     observations: Observations,
-    by_jacobian: bool = True,
+    *,
+    with_jacobian: bool = True,
 ) -> Inputs:
-    """Inputs of a regression, from the nominal chain and the places of the targets
-    alone; `estimate` says where these sit.
+    """Build inputs from the nominal chain and the positions of the targets.
 
-    `by_jacobian`: whether it looks at the Jacobian, which else has no columns.
+    Parameters
+    ----------
+    model : Model
+    estimate : Estimate, for the target offsets
+    observations : Observations
+    with_jacobian : bool
+        Whether the regression uses the Jacobian, which otherwise has no columns.
     """
     states = observations.states
     chain = model.sites.chain
-    seen = observations.state
-    others = np.hstack(
-        [states.wrench[seen], estimate.target_offset[observations.target]]
+    state = observations.state
+    covariates = np.hstack(
+        [states.wrench[state], estimate.target_offset[observations.target]]
     )
     jacobian = np.empty((len(observations), 3, 0))
-    if by_jacobian:
-        coordinates = chain.at(states.joint_angles)[seen]
+    if with_jacobian:
         jacobian = compute_position_jacobians(
-            chain, coordinates, locate_targets(model, estimate), observations.target
+            chain,
+            chain.at(states.joint_angles)[state],
+            locate_targets(model, estimate),
+            observations.target,
         )
-    return Inputs(states.joint_angles[seen], others, jacobian)
+    return Inputs(states.joint_angles[state], covariates, jacobian)
 
 
 def build_inputs(
     model: Model,
     estimate: Estimate,
     observations: Observations,
-    by_jacobian: bool = True,
+    *,
+    with_jacobian: bool = True,
 ) -> Inputs:
-    """Inputs of a regression on what a model leaves: `geometric_inputs_of`, and what
-    the model's effects do.
+    """Build `build_geometric_inputs` and add displacements by the model's effects.
 
-    The latter stands beside the Jacobian: an effect that was adopted wrongly has taken
-    its part of an error that no effect is, and a regression that cannot give it back
-    has the rest of the error and the effect to make up for.
+    The latter are columns of the Jacobian. An effect that was adopted wrongly absorbs a
+    part of an error that no effect describes. A regression that cannot undo this part
+    must describe the rest of the error and the wrong effect.
     """
-    inputs = build_geometric_inputs(model, estimate, observations, by_jacobian)
-    every = zip(model.effects, estimate.shapes, strict=True)
-    found = [
+    inputs = build_geometric_inputs(
+        model, estimate, observations, with_jacobian=with_jacobian
+    )
+    effects = [
         (effect, shapes)
-        for effect, shapes in every
+        for effect, shapes in zip(model.effects, estimate.shapes, strict=True)
         if effect.effect in list_effects() and is_commanded(effect)
     ]
-    if not found or not by_jacobian:
+    if not effects or not with_jacobian:
         return inputs
     sizes = np.array(
-        [parameter.plausible for effect, _ in found for parameter in effect.parameters]
+        [
+            parameter.plausible
+            for effect, _ in effects
+            for parameter in effect.parameters
+        ]
     )
-    around = evaluate_conditions(model, estimate, observations.states)
-    laws = [(effect.displacement, shapes) for effect, shapes in found]
     columns = compute_effect_sensitivities(
-        laws, around, inputs.jacobian, observations.state, sizes / _RAD_OF_A_SIZE
+        [(effect.displacement, shapes) for effect, shapes in effects],
+        evaluate_conditions(model, estimate, observations.states),
+        inputs.jacobian,
+        observations.state,
+        sizes / _RAD_PER_SIZE,
     )
     return replace(inputs, jacobian=np.concatenate([inputs.jacobian, columns], axis=2))
 
 
 def summarize_residual_model(
-    found: CorrectedResiduals,
+    corrected: CorrectedResiduals,
     declared: Fit,
     final: Fit,
     case: Case,
     held_out: Case,
-    draws: np.random.Generator,
-) -> dict[str, Any]:
-    """Held-out errors with a regression on what the final model leaves, beside those
-    without.
+    stream: np.random.Generator,
+) -> Remainder:
+    """Summarize held-out errors with and without the regression on the residuals.
 
-    `declared`, `final`: to the training poses. `case`: of the training poses. `draws`:
-    of the bootstrap over poses. Returns the facts of `tuned`, and ``errors``, the
-    summary of `held_out.summarize_errors` with it; ``rms_ci95_m``; of the squared error that the
-    declared model leaves the shares that effects (``physics``) and the regression
-    (``regression_share``) explain and that is ``left``; ``reduction_ci95`` of the RMS
-    by the regression alone; ``covered``, the share of coordinates inside the stated 95
-    % intervals, and ``half_width_m``, half of their median width within and outside the
-    range; ``outside``, poses beyond the joint angles or loads that were fitted, at
-    which nothing is corrected.
+    Parameters
+    ----------
+    corrected : CorrectedResiduals of the held-out poses
+    declared, final : fits to the training poses
+    case : Case of the training poses
+    held_out : Case
+    stream : of the bootstrap over poses
     """
     before, after = (
         compute_position_errors(
@@ -339,229 +376,308 @@ def summarize_residual_model(
         )
         for fitted in (declared, final)
     )
-    with_it = PositionErrors(np.linalg.norm(found.residual, axis=1), before.cluster)
-    limits, reductions = compute_error_intervals([after, with_it], _REPLICATES, draws)
-    squares = [
-        float((errors.distance**2).mean()) for errors in (before, after, with_it)
+    with_regression = PositionErrors(
+        np.linalg.norm(corrected.residual, axis=1), before.cluster
+    )
+    intervals, reductions = compute_error_intervals(
+        [after, with_regression], _REPLICATES, stream
+    )
+    low, high = intervals[1]["rms_m"]
+    square_before, square_after, square_with = (
+        float((errors.distance**2).mean())
+        for errors in (before, after, with_regression)
+    )
+    covered = None
+    half_widths = None
+    if corrected.std is not None:
+        width = NORMAL_QUANTILE * corrected.std
+        covered = float((np.abs(corrected.residual) < width).mean())
+        half_widths = HalfWidths(
+            within=_find_median(width[~corrected.outside]),
+            outside=_find_median(width[corrected.outside]),
+        )
+    return Remainder(
+        **vars(corrected.choice),
+        errors=ErrorSummary(**summarize_errors(with_regression.distance)),
+        rms_ci95_m=(float(low), float(high)),
+        reduction_ci95=(reductions[1].low, reductions[1].high),
+        physics=1.0 - square_after / square_before,
+        regression_share=(square_after - square_with) / square_before,
+        left=square_with / square_before,
+        outside=len(np.unique(before.cluster[corrected.outside])),
+        covered=covered,
+        half_width_m=half_widths,
+    )
+
+
+def _find_median(values: np.ndarray) -> float | None:
+    return float(np.median(values)) if values.size else None
+
+
+@dataclass(frozen=True)
+class TrainingFolds:
+    """M training observations of G configurations in K folds.
+
+    Attributes
+    ----------
+    configuration : (M,) int array, 0 .. G-1
+    fold : (M,) int array, 0 .. K-1, whole configurations in each
+    residual : (M, 3) array
+        Of the model fitted to all observations, m, base axes.
+    residual_without : (K, M, 3) array
+        Of the model fitted without each fold.
+    """
+
+    configuration: np.ndarray
+    fold: np.ndarray
+    residual: np.ndarray
+    residual_without: np.ndarray
+
+    @property
+    def count(self) -> int:
+        """Number of folds."""
+        return len(self.residual_without)
+
+
+def _choose_on_training(
+    fitted: Fit, observations: Observations, plan: ResidualModelPlan
+) -> RegressionChoice:
+    """Choose a regression on the training observations of a fit."""
+    sample = sample_observations(observations, _MAX_TO_CHOOSE)
+    states = sample.states
+    pose = index_poses(states)
+    configuration = number_configurations(states.joint_angles, pose)
+    configurations = configuration.max() + 1
+    folds = min(_FOLDS, configurations)
+    if plan.blocks:
+        fold = partition_poses(states.joint_angles, pose, folds)
+    else:
+        stream = np.random.default_rng(plan.seed)
+        fold = stream.permutation(configurations)[configuration] % folds
+    residual_without = [
+        compute_position_residuals(fitted.model, estimate, sample)
+        for estimate in refit_without_folds(fitted, sample, fold[pose])
     ]
-    covered = half_width = None
-    if found.std is not None:
-        width = NORMAL_QUANTILE * found.std
-        covered = float((np.abs(found.residual) < width).mean())
-        each = {"within": width[~found.outside], "outside": width[found.outside]}
-        half_width = {
-            name: float(np.median(part)) if part.size else None
-            for name, part in each.items()
-        }
-    return {
-        **found.chosen,
-        "errors": summarize_errors(with_it.distance),
-        "rms_ci95_m": [float(end) for end in limits[1]["rms_m"]],
-        "reduction_ci95": [reductions[1].low, reductions[1].high],
-        "physics": 1.0 - squares[1] / squares[0],
-        "regression_share": (squares[1] - squares[2]) / squares[0],
-        "left": squares[2] / squares[0],
-        "outside": len(np.unique(before.cluster[found.outside])),
-        "covered": covered,
-        "half_width_m": half_width,
-    }
+    training = TrainingFolds(
+        configuration[sample.cluster],
+        fold[sample.cluster],
+        compute_position_residuals(fitted.model, fitted.estimate, sample),
+        np.stack(residual_without),
+    )
+    names = [
+        name for name in list_regressions() if plan.regression in (name, BEST_REMAINDER)
+    ]
+    inputs = build_inputs(fitted.model, fitted.estimate, sample)
+    return choose_regression(names, inputs, training, plan.seed)
 
 
 def choose_regression(
-    names: Sequence[str],
-    inputs: Inputs,
-    group: np.ndarray,
-    fold: np.ndarray,
-    whole: np.ndarray,
-    without: np.ndarray,
-    seed: int,
-) -> dict[str, Any]:
-    """Choose one of some regressions and its setting by nested cross-validation; its
-    outer folds make intervals honest too.
+    names: Sequence[str], inputs: Inputs, folds: TrainingFolds, seed: int
+) -> RegressionChoice:
+    """Choose a regression and its setting by nested cross-validation.
 
-    `inputs`: of M training observations. `group`, `fold` (M,): configuration of each, 0
-    .. G-1, and its fold, 0 .. K-1. `whole` (M, 3): residuals of the model fitted to all
-    of them, m, base axes. `without` (K, M, 3): without each fold. Returns what
-    `fitted_again` needs: ``regression``, empty where nothing is to be corrected, its
-    ``words``, ``setting``, ``spread``, see `spread_of`, and ``seed``; ``left_out``, see
-    `gain_of`, with the ``level`` of the test that it had to pass, None where there are
-    too few configurations.
+    The predictions of the outer folds also scale the intervals.
+
+    Parameters
+    ----------
+    names : regressions to choose from
+    inputs : Inputs of the training observations
+    folds : TrainingFolds
+    seed : of the regressions
+
+    Returns
+    -------
+    RegressionChoice
+        With an empty name if nothing is to be corrected.
     """
-    facts: dict[str, Any] = {
-        "regression": "",
-        "words": "",
-        "seed": seed,
-        "setting": None,
-        "spread": None,
-        "left_out": None,
-    }
-    if (count := int(group.max()) + 1) < MIN_CONFIGURATIONS:
-        return facts
-    pairs = [
+    nothing = RegressionChoice("", "", seed, None, None, None)
+    configurations = int(folds.configuration.max()) + 1
+    if configurations < MIN_CONFIGURATIONS:
+        return nothing
+    candidates = [
         (name, setting)
         for name in names
         for setting in list_regressions()[name].settings
     ]
-    mine = [fold == number for number in range(len(without))]
-    parts = [inputs.select(each) for each in mine]
-    # Of predictions of a fold (second) without it and another (first): products with
-    # the residuals, and with themselves, m².
-    products = np.zeros((len(mine), len(mine), len(pairs), 2))
-    for pair in combinations(range(len(mine)), 2):
-        # Of a model without both, to first order of what leaving out each of them does
-        # to it.
-        left = without[list(pair)].sum(axis=0) - whole
-        rest = ~np.isin(fold, pair)
-        some = inputs.select(rest)
-        each = [list_regressions()[name] for name in names]
-        fits = (
-            one
-            for regression in each
-            for one in regression.fitted(some, left[rest], regression.settings, seed)
+    products = _cross_validate(names, inputs, folds, seed)
+    # Residuals of the model fitted without the fold of each observation.
+    residual = folds.residual_without[folds.fold, np.arange(len(folds.fold))]
+    predicted = np.zeros_like(residual)
+    std = np.full_like(residual, np.nan)
+    for number in range(folds.count):
+        best = _find_best_candidate(products[number].sum(axis=0))
+        if best is None:
+            continue
+        left_out = folds.fold == number
+        predictor = _fit_setting(
+            *candidates[best],
+            inputs.select(~left_out),
+            folds.residual_without[number, ~left_out],
+            seed,
         )
-        for number, predictor in enumerate(fits):
-            for other, one in (pair, pair[::-1]):
-                mean = predictor.mean(parts[one])
-                products[other, one, number] = (
-                    (left[mine[one]] * mean).sum(),
+        predicted[left_out] = predictor.mean(inputs.select(left_out))
+        std[left_out] = predictor.std(inputs.select(left_out))
+    gain = estimate_gain(
+        np.bincount(folds.configuration, (residual * predicted).sum(axis=1)),
+        np.bincount(folds.configuration, (predicted**2).sum(axis=1)),
+        len(residual),
+        folds.count,
+    )
+    best = _find_best_candidate(products.sum(axis=(0, 1)))
+    if gain.p_value > gain.level or best is None:
+        return replace(nothing, left_out=gain)
+    name, setting = candidates[best]
+    return RegressionChoice(
+        name,
+        list_regressions()[name].description,
+        seed,
+        dict(setting),
+        calibrate_intervals(np.abs(residual - gain.factor * predicted), std),
+        gain,
+    )
+
+
+def _cross_validate(
+    names: Sequence[str], inputs: Inputs, folds: TrainingFolds, seed: int
+) -> np.ndarray:
+    """Predict each fold by candidates that are fitted without it and one other fold.
+
+    Returns a (K, K, candidates, 2) array, m²: products of the predictions with the
+    residuals and with themselves, by the outer fold and by the predicted fold.
+    """
+    regressions = [list_regressions()[name] for name in names]
+    candidates = sum(len(regression.settings) for regression in regressions)
+    members = [folds.fold == number for number in range(folds.count)]
+    inputs_by_fold = [inputs.select(mask) for mask in members]
+    products = np.zeros((folds.count, folds.count, candidates, 2))
+    for pair in combinations(range(folds.count), 2):
+        # Residuals of a model fitted without both folds, to first order in the changes
+        # that leaving out each of them causes.
+        residual = folds.residual_without[list(pair)].sum(axis=0) - folds.residual
+        training = ~np.isin(folds.fold, pair)
+        training_inputs = inputs.select(training)
+        predictors = (
+            predictor
+            for regression in regressions
+            for predictor in regression.fit(
+                training_inputs, residual[training], regression.settings, seed
+            )
+        )
+        for number, predictor in enumerate(predictors):
+            for outer, predicted in (pair, pair[::-1]):
+                mean = predictor.mean(inputs_by_fold[predicted])
+                products[outer, predicted, number] = (
+                    (residual[members[predicted]] * mean).sum(),
                     (mean**2).sum(),
                 )
-    off = without[fold, np.arange(len(fold))]
-    predicted = np.zeros_like(off)
-    std = np.full_like(off, np.nan)
-    for number, (some, within) in enumerate(zip(parts, mine, strict=True)):
-        best = _best(products[number].sum(axis=0))
-        if best is not None:
-            name, setting = pairs[best]
-            predictor = next(
-                list_regressions()[name].fitted(
-                    inputs.select(~within), without[number, ~within], [setting], seed
-                )
-            )
-            predicted[within] = predictor.mean(some)
-            std[within] = predictor.std(some)
-    along, square = (
-        np.bincount(group, (rows * predicted).sum(axis=1)) for rows in (off, predicted)
-    )
-    gain = estimate_gain(along, square, len(off), len(mine))
-    level = _LEVEL if count >= _FEW else _LEVEL_OF_FEW
-    facts["left_out"] = gain | {"level": level}
-    best = _best(products.sum(axis=(0, 1)))
-    if gain["p_value"] > level or best is None:
-        return facts
-    name, setting = pairs[best]
-    spread = calibrate_intervals(np.abs(off - gain["factor"] * predicted), std)
-    return facts | {
-        "regression": name,
-        "words": list_regressions()[name].words,
-        "setting": dict(setting),
-        "spread": spread,
-    }
+    return products
+
+
+def _find_best_candidate(products: np.ndarray) -> int | None:
+    """Index of the candidate whose predictions reduce the squared error most.
+
+    Each candidate is shrunk as it needs, but by no more than half. None if no candidate
+    reduces the error. `products` (candidates, 2): see `_cross_validate`.
+    """
+    with_residual, with_itself = products.T
+    slope = with_residual / np.maximum(with_itself, np.finfo(float).tiny)
+    factor = np.clip(slope, 0.5, 1.0)
+    reductions = factor * (2.0 * with_residual - factor * with_itself)
+    best = int(np.argmax(reductions))
+    return best if reductions[best] > 0.0 else None
 
 
 def estimate_gain(
-    along: np.ndarray, square: np.ndarray, rows: int, folds: int
-) -> dict[str, float]:
-    """What predictions gain on configurations that they were made without.
+    with_residual: np.ndarray, with_itself: np.ndarray, positions: int, folds: int
+) -> CrossValidatedGain:
+    """Estimate what predictions gain on configurations that they were fitted without.
 
-    Their slope on the residuals is less than one where a regression follows noise; it
-    is shrunk once more as a mean is by James and Stein [1]. Folds share most of the
-    configurations that they are fitted to, which leaves the mean of their errors more
-    variance than independent ones would have, by 1 + k / (k - 1) of k folds [2].
+    The slope of the residuals on the predictions is less than one if a regression
+    follows noise; it is shrunk once more as James and Stein shrink a mean [1]_. Folds
+    share most of the configurations that they are fitted to. Therefore the mean of
+    their errors has more variance than the mean of independent errors, by the factor
+    1 + k / (k - 1) for k folds [2]_.
 
-    `along`, `square` (G,): of each configuration the products of predictions with
-    residuals and with themselves, m². `rows`: positions predicted. `folds`: their
-    number. Returns ``factor``, in [0, 1], by which predictions are to be multiplied;
-    ``statistic``, Student's t of the mean fall of the squared error by these, over
-    configurations; ``p_value``, that chance alone makes it so large; ``rms_m`` and
-    ``rms_std_error_m``, what is predictable of each position, m: root of the mean fall
-    before the second shrinkage.
+    Parameters
+    ----------
+    with_residual, with_itself : (G,) arrays
+        Products of the predictions of each configuration with its residuals and with
+        themselves, m².
+    positions : number of predicted positions
+    folds : number of folds
 
-    [1] James, W. and Stein, C., Estimation with quadratic loss, Fourth Berkeley
-    Symposium 1, 1961. [2] Nadeau, C. and Bengio, Y., Inference for the generalization
-    error, Machine Learning 52, 2003.
+    Returns
+    -------
+    CrossValidatedGain
+        The test uses the reduction of the squared error by shrunk predictions. The RMS
+        of the predictable part is the root of the mean reduction before the second
+        shrinkage.
+
+    References
+    ----------
+    .. [1] James and Stein, Estimation with quadratic loss, Fourth Berkeley Symposium 1,
+       1961.
+    .. [2] Nadeau and Bengio, Inference for the generalization error, Machine Learning
+       52, 2003.
     """
-    count = len(along)
-    shared = (1.0 + folds / (folds - 1.0)) * count / (count - 1.0)
-    slope = along.sum() / square.sum() if square.any() else 0.0
+    count = len(with_residual)
+    level = _LEVEL if count >= _FEW_CONFIGURATIONS else _STRICT_LEVEL
+    inflation = (1.0 + folds / (folds - 1.0)) * count / (count - 1.0)
+    slope = 0.0
+    if with_itself.any():
+        slope = with_residual.sum() / with_itself.sum()
     if slope <= 0.0:
-        return {
-            "factor": 0.0,
-            "statistic": 0.0,
-            "p_value": 1.0,
-            "rms_m": 0.0,
-            "rms_std_error_m": 0.0,
-        }
-    error = np.sqrt(shared * ((along - slope * square) ** 2).sum()) / square.sum()
-    kept = np.array([np.clip(slope - error**2 / slope, 0.0, 1.0), min(slope, 1.0)])[
-        :, None
-    ]
-    falls = kept * (2.0 * along - kept * square)
-    spread = np.sqrt(
-        shared * ((falls - falls.mean(axis=1, keepdims=True)) ** 2).sum(axis=1)
+        return CrossValidatedGain(0.0, 0.0, 1.0, 0.0, 0.0, level)
+    deviations = with_residual - slope * with_itself
+    slope_error = np.sqrt(inflation * (deviations**2).sum()) / with_itself.sum()
+    factor = np.clip(slope - slope_error**2 / slope, 0.0, 1.0)
+    factors = np.array([factor, min(slope, 1.0)])[:, None]
+    reductions = factors * (2.0 * with_residual - factors * with_itself)
+    deviations = reductions - reductions.mean(axis=1, keepdims=True)
+    errors = np.sqrt(inflation * (deviations**2).sum(axis=1))
+    shrunk_total, total = reductions.sum(axis=1)
+    statistic = float(shrunk_total / errors[0]) if errors[0] > 0.0 else 0.0
+    rms = float(np.sqrt(total / positions))
+    return CrossValidatedGain(
+        float(factor),
+        statistic,
+        float(stdtr(count - 1.0, -statistic)),
+        rms,
+        0.5 * rms * float(errors[1] / total),
+        level,
     )
-    statistic = float(falls[0].sum() / spread[0]) if spread[0] > 0.0 else 0.0
-    rms = float(np.sqrt(falls[1].sum() / rows))
-    found = {
-        "factor": float(kept[0, 0]),
-        "statistic": statistic,
-        "p_value": float(stdtr(count - 1.0, -statistic)),
-    }
-    return found | {
-        "rms_m": rms,
-        "rms_std_error_m": 0.5 * rms * float(spread[1] / falls[1].sum()),
-    }
 
 
-def _best(products: np.ndarray) -> int | None:
-    """The setting whose predictions gain most, shrunk as they need but by no more than
-    half; None where none gains.
+def calibrate_intervals(errors: np.ndarray, std: np.ndarray) -> Spread:
+    """Scale standard deviations so that intervals hold `CONFIDENCE` of left-out errors.
 
-    `products` (settings, 2).
+    This is locally weighted conformal prediction [1]_ by cross-validation. The standard
+    deviations of a regression say where it is less certain. Residuals of left-out poses,
+    which include the errors of the physical model beyond its training poses, say how
+    large the standard deviations must be.
+
+    Parameters
+    ----------
+    errors : (M, 3) array, magnitudes, m
+    std : (M, 3) array, stated standard deviations, m; not a number where none is stated
+
+    References
+    ----------
+    .. [1] Lei, G'Sell, Rinaldo, Tibshirani and Wasserman, Distribution-free predictive
+       inference for regression, Journal of the American Statistical Association 113,
+       2018.
     """
-    along, square = products.T
-    factor = np.clip(along / np.maximum(square, np.finfo(float).tiny), 0.5, 1.0)
-    gains = factor * (2.0 * along - factor * square)
-    best = int(np.argmax(gains))
-    return best if gains[best] > 0.0 else None
+    is_stated = np.isfinite(std)
+    factor = None
+    if is_stated.any():
+        factor = _estimate_conformal_std(errors[is_stated] / std[is_stated])
+    without_std = _estimate_conformal_std(errors)
+    typical = float(np.sqrt((errors**2).mean())) / without_std
+    return Spread(times=factor, otherwise_m=without_std, typical=typical)
 
 
-def calibrate_intervals(errors: np.ndarray, std: np.ndarray) -> dict[str, float | None]:
-    """How large standard deviations must be for intervals to hold `CONFIDENCE` of the
-    errors of poses left out.
-
-    Locally weighted conformal prediction [1] by cross-validation: a regression's own
-    standard deviations say where it is less sure, residuals of poses left out, with
-    what the physical model errs by beyond its training poses, how large these must be.
-
-    `errors`, `std` (M, 3): magnitudes, and what was stated for them, not a number where
-    nothing was. Returns ``times``, by how much stated ones are to be multiplied, None
-    where there are none; ``otherwise_m``, of a coordinate where none is stated;
-    ``typical``, root mean square of the errors over that, which tails make large.
-
-    [1] Lei, J., G'Sell, M., Rinaldo, A., Tibshirani, R. J. and Wasserman, L., Distribution-free predictive inference for
-        regression, Journal of the American Statistical Association 113, 2018.
-    """
-
-    def width(scores: np.ndarray) -> float:
-        # The quantile with conformal prediction's correction for a finite sample; the
-        # largest where that asks for more.
-        return (
-            float(
-                np.quantile(
-                    scores,
-                    min(CONFIDENCE * (1.0 + 1.0 / scores.size), 1.0),
-                    method="higher",
-                )
-            )
-            / NORMAL_QUANTILE
-        )
-
-    own = np.isfinite(std)
-    otherwise = width(errors)
-    times = width(errors[own] / std[own]) if own.any() else None
-    return {
-        "times": times,
-        "otherwise_m": otherwise,
-        "typical": float(np.sqrt((errors**2).mean())) / otherwise,
-    }
+def _estimate_conformal_std(scores: np.ndarray) -> float:
+    """Quantile of the scores as the standard deviation of a normal distribution, with
+    conformal prediction's correction for a finite sample."""
+    level = min(CONFIDENCE * (1.0 + 1.0 / scores.size), 1.0)
+    return float(np.quantile(scores, level, method="higher")) / NORMAL_QUANTILE

@@ -37,7 +37,10 @@ from elastocal.loop.schemas import build_measurements_schema
 from elastocal.mechanics.robot_file import parse_robot
 from elastocal.random_streams import open_stream
 from elastocal.residual_model.regressions import REGRESSIONS
-from elastocal.residual_model.selection import validate_residual_model
+from elastocal.residual_model.selection import (
+    ResidualModelPlan,
+    validate_residual_model,
+)
 from elastocal.validation.held_out import compute_position_residuals
 from elastocal.validation.transfer import transfer_fit
 from elastocal_proof.league.schemas import ENTRIES, FOLDS, MECHANISMS
@@ -229,15 +232,13 @@ def predict_held_out(
         model, estimate = transfer_fit(fitted, case, held_out)
         residual = compute_position_residuals(model, estimate, observed)
     else:
-        prediction = validate_residual_model(
-            fitted,
-            case,
-            held_out,
+        plan = ResidualModelPlan(
             method.regression,
             blocks=split != RANDOM,
             within_range=method.within_range,
             seed=seed,
         )
+        prediction = validate_residual_model(fitted, case, held_out, plan)
         residual = prediction.residual
         std = prediction.std
     if std is None:
@@ -339,5 +340,9 @@ def enter_league(job: Any) -> None:
             columns["fold"] = np.full(count, fold)
             columns["set"] = np.full(count, number)
             blocks.append(columns)
-    origin = describe_provenance(job.params, **job.wildcards)
-    write_table(job.output.entries, ENTRIES, blocks, origin)
+    write_table(
+        job.output.entries,
+        ENTRIES,
+        blocks,
+        describe_provenance(job.params, **job.wildcards),
+    )
