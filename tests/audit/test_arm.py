@@ -89,7 +89,7 @@ def test_a_tapered_link_shifts_and_twists_as_the_uniform_one_and_turns_by_the_in
 
 def test_a_joint_yields_to_the_load_where_it_has_turned_to():
     arm = Arm({"chain": "Rz(q1) Tx(2.0) [tip]"})
-    coordinates, forces = arm.loaded(
+    coordinates, forces = arm.deflect(
         np.array([[1e-4]]), np.zeros(1), np.array([0, 1000.0, 0, 0, 0, 0]), 6
     )
     np.testing.assert_allclose(coordinates, 1e-4 * forces, rtol=1e-6)

@@ -25,7 +25,7 @@ def test_an_arm_stands_by_mujoco_where_it_stands_by_pinocchio(chain):
     half = 1e-4 * draws.normal(size=(arm.coordinates, arm.coordinates))
     springs = half @ half.T
     for point in arm.points:
-        expected = arm.pose(arm.loaded(springs, angles, WRENCH, 3)[0], point)[0]
+        expected = arm.pose(arm.deflect(springs, angles, WRENCH, 3)[0], point)[0]
         found = iterate_equilibrium(
             arm, build_mujoco_model(arm), springs, angles, WRENCH, point
         )

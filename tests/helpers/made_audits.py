@@ -42,7 +42,7 @@ def draw_numbers(purpose, data_set):
 
 def deflect(arm, joint_angles, wrench):
     """Return translation and rotation vector of the point under a load."""
-    loaded_angles = arm.loaded(arm.springs, joint_angles, wrench, 1)[0]
+    loaded_angles = arm.deflect(arm.springs, joint_angles, wrench, 1)[0]
     position, rotation = arm.pose(joint_angles, POINT)
     loaded_position, loaded_rotation = arm.pose(loaded_angles, POINT)
     return [*(loaded_position - position), *pin.log3(loaded_rotation @ rotation.T)]

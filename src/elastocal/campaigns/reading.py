@@ -88,7 +88,7 @@ def read_campaign(
 
 def read_robot(path: str | Path) -> Robot:
     """Read a robot file; an `InputError` names what its schema or
-    `robot_from_document` refuses."""
+    `parse_robot` refuses."""
     return parse_robot(read_robot_document(path), Path(path).as_posix())
 
 

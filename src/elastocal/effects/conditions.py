@@ -93,7 +93,7 @@ class Conditions:
     compliance : joint compliances, (n,), rad/(N m).
     joint_angles : commanded joint angles, (S, n), rad.
     wrench : external wrench at the last measuring point, (S, 6), N and N m, base axes.
-    motion : motion of `Sites.followed`.
+    motion : motion of `Sites.tracked_points`.
     mass_corrections : errors of the declared masses, (4 m,): for each mass its error in
         kg, then the errors of its first moments along the axes of its frame beyond those
         that the error of the mass causes, kg m.
@@ -144,7 +144,7 @@ class Conditions:
             self.motion.position[0], wrench_at_base[:3], axis=0
         )
         return self.motion.generalized_forces(
-            self.sites.followed[0].after, wrench_at_base, coordinates
+            self.sites.tracked_points[0].after, wrench_at_base, coordinates
         ).T
 
     @_CachedLoad
@@ -152,9 +152,11 @@ class Conditions:
         """Generalized force of the declared masses on every coordinate of the sites,
         ndarray (S, C)."""
         masses, first_moments = self._masses_and_first_moments()
-        bodies = self.sites.followed[self.sites.joints + 2 :]
+        bodies = self.sites.tracked_points[self.sites.joints + 2 :]
         _, coordinates, states = self.motion.twist.shape
-        is_carried = self.motion.place[:, None] < [body.after for body in bodies]
+        is_carried = self.motion.transform_index[:, None] < [
+            body.after for body in bodies
+        ]
         # Neighbouring coordinates that carry the same masses have one wrench.
         is_edge = (is_carried[1:] != is_carried[:-1]).any(axis=1)
         edges = np.flatnonzero(is_edge) + 1
@@ -176,7 +178,7 @@ class Conditions:
         centres = [mass.centre_m for mass in self.sites.masses]
         masses = declared + corrections[:, 0]
         local_moments = masses[:, None] * centres + corrections[:, 1:]
-        bodies = slice(self.sites.joints + 2, len(self.sites.followed))
+        bodies = slice(self.sites.joints + 2, len(self.sites.tracked_points))
         position = self.motion.position[bodies]
         rotation = self.motion.rotation[bodies]
         first_moments = masses[:, None, None] * position + sum(
@@ -194,13 +196,13 @@ class Conditions:
         The coordinates are in the order of the chain. Yields for each mass an array (4,
         K', S) for the K' first of the coordinates, which the mass loads.
         """
-        place = self.motion.place[coordinates]
+        place = self.motion.transform_index[coordinates]
         twist = self.motion.twist[:, coordinates]
         gravity = np.array(self.sites.gravity_m_s2)
         force_per_kg = np.tensordot(gravity, twist[:3], 1)
         for body, mass in enumerate(self.sites.masses, self.sites.joints + 2):
             rotation = self.motion.rotation[body]
-            loaded = np.searchsorted(place, self.sites.followed[body].after)
+            loaded = np.searchsorted(place, self.sites.tracked_points[body].after)
             centre = self.motion.position[body] + np.tensordot(
                 mass.centre_m, rotation, (0, 1)
             )
@@ -229,10 +231,10 @@ class Conditions:
 
         It is zero on the joints, whose sag is an effect of its own.
         """
-        force = np.zeros((self.motion.place.size, len(self.wrench)))
-        for end, mass in enumerate(self.sites.usual_masses, 1):
+        force = np.zeros((self.motion.transform_index.size, len(self.wrench)))
+        for end, mass in enumerate(self.sites.typical_masses_kg, 1):
             wrench = self._gravity_wrench(mass, mass * self.motion.position[end])
-            after = self.sites.followed[end].after
+            after = self.sites.tracked_points[end].after
             force += self.motion.generalized_forces(after, wrench)
         force[: self.sites.joints] = 0.0
         return force.T
@@ -241,7 +243,7 @@ class Conditions:
     def total(self) -> np.ndarray:
         """Load by the external wrench and the declared or usual masses on every
         coordinate of the sites, ndarray (S, C)."""
-        if self.sites.usual_weight:
+        if self.sites.bears_typical_weight:
             weight = self.usual_gravity
         elif self.sites.masses:
             weight = self.gravity
@@ -271,7 +273,7 @@ class Conditions:
         else:
             wrench = self._gravity_wrench(0.0, self.motion.rotation[end, :, axis])
         return self.motion.generalized_forces(
-            self.sites.followed[end].after, wrench, slice(self.sites.joints)
+            self.sites.tracked_points[end].after, wrench, slice(self.sites.joints)
         ).T
 
 
@@ -325,7 +327,7 @@ def build_conditions(
         np.asarray(compliance),
         states.joint_angles,
         states.wrench,
-        compute_motion(sites.chain, coordinates, sites.followed),
+        compute_motion(sites.chain, coordinates, sites.tracked_points),
         mass_corrections,
         unknown if states.approach is None else states.approach,
         time_s,
@@ -405,7 +407,7 @@ def find_offered_needs(sites: Sites, states: States) -> frozenset[str]:
         states.temperature_c is not None and np.ptp(states.temperature_c) > 0
     )
     is_offered = {
-        "load": sites.usual_weight or loaded,
+        "load": sites.bears_typical_weight or loaded,
         "load on the joints": loaded,
         "external load": external,
         "approach": has_approach,

@@ -323,7 +323,7 @@ def linearize_coordinates(
     coordinates = compute_displaced_coordinates(model, estimate, conditions)
     sites = model.sites
     points = locate_targets(model, estimate)
-    moved = compute_motion(sites.chain, coordinates, (*sites.followed, *points))
+    moved = compute_motion(sites.chain, coordinates, (*sites.tracked_points, *points))
     # Each fitted component of a target is an additional coordinate.
     target_coordinates = sum(
         components.stop - components.start
@@ -343,7 +343,7 @@ def linearize_coordinates(
         if len(members) == len(coordinates) and np.array_equal(members, state):
             # Each state has one observation, so there is nothing to gather.
             state = slice(None)  # type: ignore[assignment]
-        followed = len(sites.followed) + index
+        followed = len(sites.tracked_points) + index
         point_position = moved.position[followed][:, state]
         position[members] = point_position.T
         rotation[members] = np.moveaxis(moved.rotation[followed][..., state], -1, 0)
@@ -455,7 +455,7 @@ def _load_effect_basis(
     present = [sum_displacements([effect], conditions) for effect in influenced]
     coordinates = sorted(
         {coordinate for displacements in present for coordinate in displacements},
-        key=conditions.motion.place.__getitem__,
+        key=conditions.motion.transform_index.__getitem__,
     )
     steps = np.array(
         [_LOAD_STEP * parameter.plausible for parameter in load_effect.parameters]

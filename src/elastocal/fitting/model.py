@@ -178,7 +178,7 @@ def build_declared_model(
     # Without known weights, a compliant base under an arm that slides on its first
     # joint is indistinguishable from the sag of that arm.
     unknown_load = not sites.masses and not measurements.wrench.any()
-    sites = replace(sites, usual_weight=sites.prismatic[0] and unknown_load)
+    sites = replace(sites, bears_typical_weight=sites.prismatic[0] and unknown_load)
     load_effects = []
     if campaign.compliance == "identify":
         load_effects.append(joint_compliance(sites))
@@ -346,7 +346,9 @@ def evaluate_conditions(
         return conditions
     for _ in range(_LOAD_ITERATIONS):
         displaced = compute_displaced_coordinates(model, estimate, conditions)
-        motion = compute_motion(model.sites.chain, displaced, model.sites.followed)
+        motion = compute_motion(
+            model.sites.chain, displaced, model.sites.tracked_points
+        )
         conditions = replace_motion(conditions, motion)
     return conditions
 

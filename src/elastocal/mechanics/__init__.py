@@ -1,5 +1,5 @@
 """Mechanics of a serial robot: the chain, its kinematics and elastostatics, elastic
-links, where an effect can act.
+links, and the sites where an effect can act.
 
-Equations 1 to 10 of the study, over any leading axes. Imports `elastocal.errors` alone.
+Equations 1 to 10 of the study, for arrays with any leading axes.
 """

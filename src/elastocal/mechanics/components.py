@@ -1,5 +1,5 @@
-"""Components of a displacement and of a wrench: name, unit and meaning, as every table
-and file has them."""
+"""Components of a displacement and of a wrench: the name, unit and meaning that all
+tables and files use."""
 
 COMPONENTS = (
     *((f"d{axis}", "m", f"displacement along base {axis}") for axis in "xyz"),

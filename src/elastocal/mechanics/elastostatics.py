@@ -1,16 +1,18 @@
-"""Equations 5-10: what a wrench does to a chain of springs; the extended model, whose
-links are springs too.
+"""Equations 5-10: deflection of a chain of springs under a wrench, and the extended
+model, whose links are springs as well.
 
-Wrenches are (force, moment) in N and N m at the end-effector, base axes. Deflections
-are (displacement, rotation vector) in m and rad, base axes. By the virtual joint method
-elastic joints, and six-dimensional springs at the ends of links, are joints that yield
-to the generalized forces of the wrench [1], [2], in rad/(N m). Forces are taken at the
-unloaded pose.
+Wrenches are (force, moment) in N and N m at the end-effector, in base axes. Deflections
+are (displacement, rotation vector) in m and rad, in base axes. In the virtual joint
+method, elastic joints and six-dimensional springs at the ends of links are joints that
+yield to the generalized forces of the wrench [1], [2], in rad/(N m). Forces are
+evaluated at the unloaded pose.
 
-[1] Salisbury, J. K., Active stiffness control of a manipulator in Cartesian coordinates, IEEE Conference on Decision and
-    Control, 1980.
-[2] Pashkevich, A., Chablat, D. and Wenger, P., Stiffness analysis of overconstrained parallel manipulators, Mechanism and
-    Machine Theory 44, 2009.
+References
+----------
+[1] Salisbury, J. K., Active stiffness control of a manipulator in Cartesian
+    coordinates, IEEE Conference on Decision and Control, 1980.
+[2] Pashkevich, A., Chablat, D. and Wenger, P., Stiffness analysis of overconstrained
+    parallel manipulators, Mechanism and Machine Theory 44, 2009.
 """
 
 from __future__ import annotations
@@ -39,12 +41,19 @@ def compute_offset_wrench(
     offset_m: Sequence[float] | np.ndarray,
     rotation: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Wrench at the end-effector of a force whose line of action is shifted from it.
+    """Compute the wrench at the end-effector of a force that acts beside it.
 
-    `force` (..., 3): N, base axes. `offset_m` (3,): from the end-effector to the point
-    of application, m. `rotation` (..., 3, 3): orientation of the end-effector where the
-    offset turns with the tool; without it the offset is along base axes. Returns (...,
-    6).
+    Parameters
+    ----------
+    force : (..., 3) array, N, base axes
+    offset_m : (3,), from the end-effector to the point of application
+    rotation : (..., 3, 3) array, optional
+        Orientation of the end-effector, if the offset turns with the tool. Without it
+        the offset is in base axes.
+
+    Returns
+    -------
+    (..., 6) array
     """
     lever = np.asarray(offset_m, float)
     if rotation is not None:
@@ -53,11 +62,17 @@ def compute_offset_wrench(
 
 
 def compute_generalized_forces(jacobian: np.ndarray, wrench: np.ndarray) -> np.ndarray:
-    """Torques (forces) on the coordinates of a chain, J^T w by virtual work (the
-    right-hand factor of equation 7).
+    """Compute the torques (forces) on the coordinates of a chain, J^T w by virtual work
+    (the right-hand factor of equation 7).
 
-    `jacobian` (..., 6, n): of the point where the wrench is stated. `wrench` (..., 6).
-    Returns (..., n).
+    Parameters
+    ----------
+    jacobian : (..., 6, n) array, of the point to which the wrench refers
+    wrench : (..., 6) array
+
+    Returns
+    -------
+    (..., n) array
     """
     return np.asarray(
         sum(jacobian[..., row, :] * wrench[..., row, None] for row in range(6))
@@ -67,23 +82,25 @@ def compute_generalized_forces(jacobian: np.ndarray, wrench: np.ndarray) -> np.n
 def select_loaded_point(
     chain: Chain, point: MeasuringPoint, wrench_at: str
 ) -> MeasuringPoint:
-    """Where the wrench acts that deflects a measuring point (interpretation R6).
+    """Select the point at which the wrench acts that deflects a measuring point
+    (interpretation R6).
 
-    `wrench_at`: "end_effector", itself, whatever target sits on it; or
-    "measuring_point".
+    Parameters
+    ----------
+    chain : chain of the point
+    point : measuring point whose deflection is computed
+    wrench_at : "end_effector" for its origin, without any target, or "measuring_point"
     """
-    return (
-        replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0))
-        if wrench_at == "end_effector"
-        else point
-    )
+    if wrench_at == "end_effector":
+        return replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0))
+    return point
 
 
 def compute_joint_torques(
     chain: Chain, joint_angles: np.ndarray, wrench: np.ndarray, at: MeasuringPoint
 ) -> np.ndarray:
-    """Torques on the joints, ndarray (..., n), N m, by a wrench (..., 6) stated at a
-    point, see `loaded_point`."""
+    """Compute the torques (..., n) in N m on the joints of a wrench (..., 6) that
+    refers to a point, see `select_loaded_point`."""
     return compute_generalized_forces(
         compute_jacobians(chain, joint_angles, at), wrench
     )
@@ -92,11 +109,19 @@ def compute_joint_torques(
 def build_regressor(
     jacobian: np.ndarray, torques: np.ndarray, out: np.ndarray | None = None
 ) -> np.ndarray:
-    """Matrix A of equation 10, with columns J_j J_j^T w, so that the deflection is A c
-    (equation 9), ndarray (..., 6, n).
+    """Build matrix A of equation 10, with columns J_j J_j^T w, so that the deflection
+    is A c (equation 9).
 
-    `jacobian` (..., 6, n): of the measuring point. `torques` (..., n): J^T w of the
-    loaded point. `out`: overwritten with the result; may be the Jacobian itself.
+    Parameters
+    ----------
+    jacobian : (..., 6, n) array, of the measuring point
+    torques : (..., n) array, J^T w of the loaded point
+    out : array, optional
+        Overwritten with the result; may be the Jacobian itself.
+
+    Returns
+    -------
+    (..., 6, n) array
     """
     return np.multiply(jacobian, torques[..., None, :], out=out)
 
@@ -107,12 +132,20 @@ def compute_exact_deflections(
     spring_deflections: np.ndarray,
     point: MeasuringPoint,
 ) -> np.ndarray:
-    """Deflection of a measuring point by the exact kinematics: the pose at q + theta
-    against the pose at q.
+    """Compute the deflection of a measuring point by the exact kinematics: the pose at
+    q + theta against the pose at q.
 
-    `chain`: may be an extended chain; then `coordinates` and `spring_deflections` cover
-    its link springs too. `coordinates`, `spring_deflections` (..., n): q (zero for link
-    springs) and theta of equation 7, rad or m. Returns (..., 6).
+    Parameters
+    ----------
+    chain : Chain
+        For an extended chain, the coordinates include its link springs.
+    coordinates : (..., n) array, q, zero for link springs, rad or m
+    spring_deflections : (..., n) array, theta of equation 7, rad or m
+    point : measuring point
+
+    Returns
+    -------
+    (..., 6) array
     """
     unloaded = compute_poses(chain, coordinates, point)
     loaded = compute_poses(chain, coordinates + spring_deflections, point)
@@ -120,63 +153,72 @@ def compute_exact_deflections(
 
 
 def compute_tube_compliance(tube: Tube, length_m: float) -> np.ndarray:
-    """Compliance of a cantilever tube at its tip, beam along x (Euler-Bernoulli bending
-    [1], St Venant torsion [2]).
+    """Compute the compliance of a cantilever tube at its tip, with the beam along x
+    (Euler-Bernoulli bending [1], St Venant torsion [2]).
 
-    Returns (6, 6): deflection (m, rad) per wrench (N, N m), both at the tip, in the
-    frame of the beam.
+    Parameters
+    ----------
+    tube : cross-section and material
+    length_m : length of the beam
 
+    Returns
+    -------
+    (6, 6) array
+        Deflection (m, rad) per wrench (N, N m), both at the tip, in the beam's frame.
+
+    References
+    ----------
     [1] Przemieniecki, J. S., Theory of Matrix Structural Analysis, McGraw-Hill, 1968.
     [2] Timoshenko, S. P. and Goodier, J. N., Theory of Elasticity, McGraw-Hill, 1970.
     """
     outer = tube.outer_diameter_m
     inner = tube.outer_diameter_m - 2 * tube.wall_m
-    length = length_m
     area = np.pi * (outer**2 - inner**2) / 4
-    bending = tube.youngs_modulus_Pa * np.pi * (outer**4 - inner**4) / 64
-    torsion = tube.shear_modulus_Pa * np.pi * (outer**4 - inner**4) / 32
-    sideways = [length**3 / (3 * bending)] * 2
-    along = length / (tube.youngs_modulus_Pa * area)
-    compliance = np.diag(
-        [along, *sideways, length / torsion, length / bending, length / bending]
-    )
-    compliance[1, 5] = compliance[5, 1] = length**2 / (2 * bending)
-    compliance[2, 4] = compliance[4, 2] = -(length**2) / (2 * bending)
+    bending_stiffness = tube.youngs_modulus_Pa * np.pi * (outer**4 - inner**4) / 64
+    torsion_stiffness = tube.shear_modulus_Pa * np.pi * (outer**4 - inner**4) / 32
+    axial = length_m / (tube.youngs_modulus_Pa * area)
+    lateral = length_m**3 / (3 * bending_stiffness)
+    torsion = length_m / torsion_stiffness
+    bending = length_m / bending_stiffness
+    compliance = np.diag([axial, lateral, lateral, torsion, bending, bending])
+    coupling = length_m**2 / (2 * bending_stiffness)
+    compliance[1, 5] = compliance[5, 1] = coupling
+    compliance[2, 4] = compliance[4, 2] = -coupling
     return compliance
 
 
 def compute_beam_axes(link: Link) -> np.ndarray:
-    """Axes of a link as a beam, x along it, twice: of displacements and of rotations;
-    (6, 6), columns in the chain's frame."""
-    along = np.array(link.vector_m) / np.linalg.norm(link.vector_m)
-    # A round tube has no preferred lateral axes: any right-handed triad with x along
+    """Compute the axes of a link as a beam, with x along it.
+
+    Returns a (6, 6) array, block diagonal for displacements and rotations; its columns
+    are in the chain's frame.
+    """
+    axial = np.array(link.vector_m) / np.linalg.norm(link.vector_m)
+    # A round tube has no preferred lateral axes, so any right-handed triad with x along
     # the link will do.
-    helper = np.eye(3)[np.argmin(np.abs(along))]
-    across = np.cross(along, helper) / np.linalg.norm(np.cross(along, helper))
-    return np.kron(np.eye(2), np.column_stack([along, across, np.cross(along, across)]))
+    helper = np.eye(3)[np.argmin(np.abs(axial))]
+    lateral = np.cross(axial, helper) / np.linalg.norm(np.cross(axial, helper))
+    triad = np.column_stack([axial, lateral, np.cross(axial, lateral)])
+    return np.kron(np.eye(2), triad)
 
 
 def build_extended_chain(robot: Robot) -> Chain:
-    """The robot's chain with Tx Ty Tz Rx Ry Rz springs (equation 5) at the far end of
-    each link, behind those of the joints."""
-    return insert_coordinates(
-        robot.chain,
-        dict.fromkeys((link.after for link in robot.links), SIX_DISPLACEMENTS),
-    )
+    """Build the robot's chain with Tx Ty Tz Rx Ry Rz springs (equation 5) at the far
+    end of each link; their coordinates follow those of the joints."""
+    link_ends = (link.after for link in robot.links)
+    return insert_coordinates(robot.chain, dict.fromkeys(link_ends, SIX_DISPLACEMENTS))
 
 
 def build_spring_compliance(robot: Robot) -> np.ndarray:
-    """Compliance of all springs of the extended chain, joints, then links: the inverse
-    of K_theta in equation 7, (m, m)."""
+    """Build the compliance matrix (m, m) of all springs of the extended chain, joints
+    before links: the inverse of K_theta in equation 7."""
     n = robot.joints
     compliance = np.zeros((n + 6 * len(robot.links),) * 2)
     compliance[:n, :n] = np.diag(robot.compliance)
     for number, link in enumerate(robot.links):
         block = slice(n + 6 * number, n + 6 * number + 6)
-        turn = compute_beam_axes(link)
-        compliance[block, block] = (
-            turn
-            @ compute_tube_compliance(link.tube, float(np.linalg.norm(link.vector_m)))
-            @ turn.T
-        )
+        axes = compute_beam_axes(link)
+        length_m = float(np.linalg.norm(link.vector_m))
+        tube_compliance = compute_tube_compliance(link.tube, length_m)
+        compliance[block, block] = axes @ tube_compliance @ axes.T
     return compliance

@@ -1,5 +1,5 @@
-"""A robot: its chain, what is known of its elasticity, weight and gears, and what
-robots of its size usually have."""
+"""A robot: its chain, the known properties of its elasticity, weight and gears, and
+typical values for robots of its size."""
 
 from __future__ import annotations
 
@@ -14,21 +14,23 @@ if TYPE_CHECKING:
 
     from elastocal.mechanics.chain import Chain
 
-# m/s² (ISO 80000-3), on a floor; as scipy.constants.g, whose import costs a job of the
-# study more than its work.
+# m/s² (ISO 80000-3), as scipy.constants.g, whose import takes a job of the study longer
+# than its work.
 STANDARD_GRAVITY = 9.80665
+# Gravity of a robot on a level floor, base axes.
 STANDING = (0.0, 0.0, -STANDARD_GRAVITY)
-# Controllers count revolute joints within a turn either way.
+# Joint limits if none are known: controllers count revolute joints within one turn
+# either way.
 UNLIMITED_DEG = (-360.0, 360.0)
-# Gears of robots wind up by 3 (cycloidal) to 7 arc minutes (strain wave) under the
-# torque that they are rated for, by their makers' catalogues.
+# Torsion of a robot's gear under its rated torque: 3 (cycloidal) to 7 arc minutes
+# (strain wave) by the makers' catalogues.
 _WIND_UP_RAD = 2e-3
-# A rack or a ball screw of a track, 50 N/µm.
+# Compliance of a rack or a ball screw of a track, 50 N/µm.
 _TRACK_M_PER_N = 2e-8
-# Rated loads of arms of 1 to 3 m grow with the volume that they reach: 10 kg with 1.3
-# m, 165 kg with 2.7 m.
+# Rated loads of arms of 1 to 3 m grow with the volume of the reach: 10 kg at 1.3 m, 165
+# kg at 2.7 m.
 _LOAD_KG_PER_M3 = 8.0
-# Wrists are rated for a load whose centre lies so far from the flange at least.
+# Wrists are rated for a load whose centre is at least this far from the flange.
 _SHORTEST_LEVER_M = 0.2
 
 
@@ -44,11 +46,13 @@ class Tube:
 
 @dataclass(frozen=True)
 class Link:
-    """A rigid stretch of the chain between two joints, and the tube that it is taken
-    for.
+    """A rigid section of the chain between two joints, modelled as a tube.
 
-    `after`: transforms of the chain before its far end. `vector_m`: from its near end
-    to that, in the frame of the chain there.
+    Attributes
+    ----------
+    after : number of transforms of the chain before its far end
+    vector_m : from its near to its far end, in the frame of the chain there
+    tube : cross-section and material
     """
 
     after: int
@@ -58,11 +62,14 @@ class Link:
 
 @dataclass(frozen=True)
 class Mass:
-    """What a link weighs, as its file declares it.
+    """The declared mass of a link.
 
-    `link`: carried by this joint; 0 for the column. `centre_m`: centre of mass in the
-    frame directly behind the joint, see `robot_file`. `relative_std`: how well this is
-    known: of the mass, and of each component of the centre.
+    Attributes
+    ----------
+    link : number of the joint that carries the link, 0 for the column
+    mass_kg : mass
+    centre_m : centre of mass in the frame directly behind the joint, see `robot_file`
+    relative_std : relative uncertainty of the mass and of each component of the centre
     """
 
     link: int
@@ -73,7 +80,7 @@ class Mass:
 
 @dataclass(frozen=True)
 class Compensator:
-    """A gravity compensator, "spring" or "gas", beside a joint, counted from 1."""
+    """A gravity compensator, "spring" or "gas", at a joint, counted from 1."""
 
     joint: int
     kind: str
@@ -83,17 +90,29 @@ class Compensator:
 class Robot:
     """A robot as its file describes it, in SI units.
 
-    `compliance` (n,): joint compliances, rad/(N m); of prismatic joints m/N. Usual ones
-    where they are not known. `joint_limits` (n, 2): rad; of prismatic joints m. A turn
-    either way where they are not known. `links`: elastic links of the extended model;
-    empty for the reduced model. `reported_matrix`, `reported_offset` (n, n), (n,):
-    joint angles from what the controller reports: q = matrix @ reported + offset (rad).
-    `masses`: in the order of the links; empty where nothing is known. `gravity_m_s2`:
-    base axes. `gear_ratio`: turns of the motor for one of the joint, None for joints
-    where it is not known; None where no joint's is. `payload_kg`: rated. `joint_names`:
-    what others call the joints, as in the URDF file that a robot comes from; None where
-    they have no names. `compliance_known`: whether the compliances are the robot's;
-    else they are a scale for what is to be identified, see `usual_values`.
+    Attributes
+    ----------
+    name : name of the robot
+    chain : kinematic chain
+    compliance : (n,) array
+        Joint compliances, rad/(N m), of prismatic joints m/N; typical values if they
+        are not known.
+    joint_limits : (n, 2) array
+        Rad, of prismatic joints m; one turn either way if they are not known.
+    links : elastic links of the extended model; empty for the reduced model
+    reported_matrix, reported_offset : (n, n) and (n,) arrays
+        Joint angles from those that the controller reports: q = matrix @ reported +
+        offset (rad).
+    masses : in the order of the links; empty if none are known
+    gravity_m_s2 : base axes
+    gear_ratio : tuple, optional
+        Turns of the motor for one turn of each joint, None for an unknown ratio.
+    compensator : gravity compensator, if there is one
+    payload_kg : rated load, if it is known
+    joint_names : names of the joints elsewhere, such as in the robot's URDF file
+    compliance_known : bool
+        Whether the compliances belong to the robot. If not, they are the scale of
+        compliances to identify, see `estimate_typical_compliance`.
     """
 
     name: str
@@ -117,19 +136,20 @@ class Robot:
         return self.chain.coordinates
 
     def model_angles(self, reported: np.ndarray) -> np.ndarray:
-        """The chain's joint angles (..., n) from those that the controller reports,
-        rad."""
+        """Convert joint angles (..., n) that the controller reports to those of the
+        chain, rad."""
         return reported @ self.reported_matrix.T + self.reported_offset
 
     def reported_angles(self, angles: np.ndarray) -> np.ndarray:
-        """Joint angles (N, n) as the controller reports them from the chain's, rad."""
+        """Convert joint angles (N, n) of the chain to those that the controller
+        reports, rad."""
         return np.linalg.solve(
             self.reported_matrix, (angles - self.reported_offset).T
         ).T
 
 
 def set_target_offset(robot: Robot, offset_m: Sequence[float]) -> Robot:
-    """A robot with the same target offset on every measuring point (T_tool,
+    """Set the same target offset on every measuring point of a robot (T_tool,
     interpretation R5)."""
     points = tuple(
         replace(point, offset_m=tuple(offset_m)) for point in robot.chain.points
@@ -138,37 +158,41 @@ def set_target_offset(robot: Robot, offset_m: Sequence[float]) -> Robot:
 
 
 def estimate_typical_payload_kg(chain: Chain) -> float:
-    """A rated load that suits the reach of an arm."""
-    return _LOAD_KG_PER_M3 * float(_reach_behind(chain)[0]) ** 3
+    """Estimate the rated load of an arm from its reach."""
+    return _LOAD_KG_PER_M3 * float(_sum_lengths_behind(chain)[0]) ** 3
 
 
 def estimate_typical_compliance(
     chain: Chain, payload_kg: float | None = None
 ) -> np.ndarray:
-    """Joint compliances (n,) that suit the size of an arm: two milliradians under the
-    rated load at the longest lever.
+    """Estimate joint compliances (n,) from the size of an arm: two milliradians under
+    the rated load at the longest lever.
 
-    The published ones of KUKA and FANUC robots of 165 kg are 0.5 to 5 times these: a
-    scale for what is to be identified, no value to compute with. `payload_kg`: rated
-    load; by `usual_payload_kg` without.
+    The published compliances of KUKA and FANUC robots of 165 kg are 0.5 to 5 times
+    these values. Use them as a scale for identification, not to compute deflections.
+
+    Parameters
+    ----------
+    chain : Chain
+    payload_kg : float, optional
+        Rated load; by default from `estimate_typical_payload_kg`.
     """
-    load_N = STANDARD_GRAVITY * (
-        estimate_typical_payload_kg(chain) if payload_kg is None else payload_kg
-    )
-    levers = np.maximum(_reach_behind(chain), _SHORTEST_LEVER_M)
-    # A chain without lengths has a lever all the same, and a load of a kilogram.
-    return np.where(
-        chain.prismatic,
-        _TRACK_M_PER_N,
-        _WIND_UP_RAD / (max(load_N, STANDARD_GRAVITY) * levers),
-    )
+    if payload_kg is None:
+        payload_kg = estimate_typical_payload_kg(chain)
+    load_N = STANDARD_GRAVITY * payload_kg
+    # Give a chain without lengths a lever as well, and a load of a kilogram.
+    levers = np.maximum(_sum_lengths_behind(chain), _SHORTEST_LEVER_M)
+    revolute = _WIND_UP_RAD / (max(load_N, STANDARD_GRAVITY) * levers)
+    return np.where(chain.prismatic, _TRACK_M_PER_N, revolute)
 
 
-def _reach_behind(chain: Chain) -> np.ndarray:
-    """Lengths of the chain behind each joint, stretched out, ndarray (n,), m."""
-    lengths = [abs(t.constant) if t.kind == "T" else 0.0 for t in chain.transforms]
-    places = [
-        next(p for p, t in enumerate(chain.transforms) if t.coordinate == joint)
-        for joint in range(chain.coordinates)
-    ]
-    return np.array([math.fsum(lengths[place:]) for place in places])
+def _sum_lengths_behind(chain: Chain) -> np.ndarray:
+    """Sum the lengths of the chain behind each joint, ndarray (n,), m."""
+    lengths = []
+    joints = {}
+    for index, transform in enumerate(chain.transforms):
+        lengths.append(abs(transform.constant) if transform.kind == "T" else 0.0)
+        joints[transform.coordinate] = index
+    return np.array(
+        [math.fsum(lengths[joints[joint] :]) for joint in range(chain.coordinates)]
+    )

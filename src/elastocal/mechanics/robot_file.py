@@ -1,8 +1,9 @@
-"""A robot from its file and back, with the checks that the file's schema cannot make.
+"""Read and write robot files, with the checks that the file's schema cannot make.
 
-The chain is in the notation of `chain`. Without ``joint_limits_deg`` a joint turns once either way; without
-``compliance_urad_per_Nm`` the compliances have to be identified, or the joints count as rigid where nothing loads them. A
-robot file may say what the links weigh::
+The chain is in the notation of `chain`. Without ``joint_limits_deg`` a joint makes one
+turn either way. Without ``compliance_urad_per_Nm`` the compliances have to be
+identified, or the joints count as rigid if nothing loads them. A robot file may state
+the masses of the links::
 
     masses:
       - {link: 2, mass_kg: 190, centre_m: [0.52, 0.0, 0.03], relative_std: 0.1}
@@ -11,14 +12,14 @@ robot file may say what the links weigh::
     compensator: {joint: 2, kind: spring}
     payload_kg: 165
 
-Link k is what joint k carries; link 0 is the column before joint 1. ``centre_m`` is
-stated in the frame of the chain directly behind the transform ``R.(qk)`` (of link 0: in
-the base frame): its origin lies on the axis of joint k, where the chain has it, and its
-axes turn with the joint, so that one axis is the joint's own. With all of the chain at
-zero these are base axes unless the chain has fixed rotations before. ``relative_std``
-is the standard deviation of the mass over the mass, and of each component of the centre
-over its distance from the origin (0.1 m at least). Gravity is given in base axes: a
-robot on a wall or on a tilted foot has another.
+Link k is carried by joint k; link 0 is the column before joint 1. ``centre_m`` is
+stated in the frame of the chain directly behind the transform ``R.(qk)``, for link 0 in
+the base frame. The origin of this frame lies on the axis of joint k, at the position of
+the joint in the chain, and its axes turn with the joint, so that one axis is that of
+the joint. With all joints at zero its axes are base axes, unless the chain has fixed
+rotations before. ``relative_std`` is the standard deviation of the mass over the mass,
+and of each component of the centre over its distance from the origin (0.1 m at least).
+Gravity is given in base axes: it is different for a robot on a wall or a tilted foot.
 """
 
 from __future__ import annotations
@@ -50,112 +51,95 @@ if TYPE_CHECKING:
 
     from elastocal.mechanics.chain import Chain
 
-# The longest serial arms of the market reach 4.7 m and their lengths, the column's
-# included, sum to 7; any of them written in centimetres, inches or millimetres is
-# beyond this.
+# Upper bound on the sum of lengths of a chain. The longest serial arms of the market
+# reach 4.7 m, and their lengths, with the column, sum to 7 m. Lengths of any arm in
+# centimetres, inches or millimetres exceed the bound.
 LONGEST_REACH_M = 10.0
-# In orbit there is still a microgravity of some 1e-5 m/s².
+# Lower bound on gravity, m/s²; the microgravity of an orbit is some 1e-5 m/s².
 _LEAST_GRAVITY = 1e-6
 
 
 def parse_robot(document: Mapping[str, Any], source: str = "robot") -> Robot:
-    """Make a robot from the contents of its file, already validated against the robot
-    schema.
+    """Make a robot from the contents of its file.
 
-    `document`: keys as in ``schemas/robot.yaml``. `source`: named in errors. Raises
-    `InputError` where the chain does not parse or reaches farther than any machine, or
-    a list has another length than there are joints.
+    Parameters
+    ----------
+    document : contents, valid by ``schemas/robot.yaml``
+    source : name of the file for errors
+
+    Raises
+    ------
+    InputError
+        If the chain does not parse or reaches farther than any machine, a list has
+        another length than there are joints, or a value is impossible.
     """
     chain = parse_chain(document["chain"], document.get("lengths_m", {}), source)
-    reach = sum(
-        abs(transform.constant)
-        for transform in chain.transforms
-        if transform.kind == "T"
-    )
-    if reach > LONGEST_REACH_M:
-        key = "lengths_m" if document.get("lengths_m") else "chain"
-        allowed = "lengths in metres (not millimetres) that reach"
-        raise InputError(
-            source,
-            key,
-            f"a chain that reaches {reach:.4g} m",
-            f"{allowed} {LONGEST_REACH_M:g} m at most",
-        )
+    _check_reach(chain, "lengths_m" if document.get("lengths_m") else "chain", source)
     n = chain.coordinates
-    reported = document.get("reported_joints", {})
-    matrix = reported.get("matrix", np.eye(n).tolist())
-    offset = reported.get("offset_deg", [0.0] * n)
-    if [len(row) for row in matrix] != [n] * n or len(offset) != n:
-        found = f"rows of {[len(row) for row in matrix]} and {format_count(len(offset), 'offset')}"
-        raise InputError(
-            source, "reported_joints", found, f"{n} rows of {n} numbers and {n} offsets"
-        )
     gravity = tuple(map(float, document.get("gravity_m_s2", STANDING)))
     if math.hypot(*gravity) < _LEAST_GRAVITY:
         allowed = f"a vector in base axes of {_LEAST_GRAVITY:g} m/s² or more"
         raise InputError(source, "gravity_m_s2", str(document["gravity_m_s2"]), allowed)
-    beside = (
-        Compensator(**document["compensator"]) if document.get("compensator") else None
-    )
-    if beside and beside.joint > n:
-        raise InputError(
-            source, "compensator.joint", str(beside.joint), f"a joint from 1 to {n}"
-        )
-    springs = _of_each_joint(document, "compliance_urad_per_Nm", n, source)
+    compensator = None
+    if document.get("compensator"):
+        compensator = Compensator(**document["compensator"])
+        if compensator.joint > n:
+            joint = str(compensator.joint)
+            allowed = f"a joint from 1 to {n}"
+            raise InputError(source, "compensator.joint", joint, allowed)
     payload_kg = document.get("payload_kg")
+    compliance = estimate_typical_compliance(chain, payload_kg)
+    stated = _get_joint_entries(document, "compliance_urad_per_Nm", n, source)
+    if stated is not None:
+        compliance = 1e-6 * np.array(stated, float)
+    matrix, offset = _parse_reported_joints(document, chain, source)
     return Robot(
         name=document["name"],
         chain=chain,
-        compliance=estimate_typical_compliance(chain, payload_kg)
-        if springs is None
-        else 1e-6 * np.array(springs, float),
-        joint_limits=parse_joint_limits(
-            document.get("joint_limits_deg"), chain, source
-        ),
-        links=_links(chain, document.get("links"), source),
-        reported_matrix=np.array(matrix, float),
-        reported_offset=np.array(offset, float) * _per_degree(chain),
-        masses=_masses(document.get("masses", ()), n, source),
+        compliance=compliance,
+        joint_limits=parse_joint_limits(document, chain, source),
+        links=_parse_links(chain, document.get("links"), source),
+        reported_matrix=matrix,
+        reported_offset=offset,
+        masses=_parse_masses(document.get("masses", ()), n, source),
         gravity_m_s2=gravity,
-        gear_ratio=_of_each_joint(document, "gear_ratio", n, source, "one or null"),
-        compensator=beside,
+        gear_ratio=_get_joint_entries(document, "gear_ratio", n, source, "one or null"),
+        compensator=compensator,
         payload_kg=payload_kg,
-        joint_names=_of_each_joint(document, "joint_names", n, source),
-        compliance_known=springs is not None,
+        joint_names=_get_joint_entries(document, "joint_names", n, source),
+        compliance_known=stated is not None,
     )
 
 
 def describe_robot(robot: Robot) -> dict[str, Any]:
-    """A robot without elastic links as the contents of its file, the inverse of
-    `robot_from_document`.
+    """Describe a robot without elastic links as the contents of its file, the inverse
+    of `parse_robot`.
 
-    Optional keys only where they say something; lengths stand in the chain as numbers.
+    Optional keys are left out if they have their default; lengths stand in the chain as
+    numbers.
     """
-    counted_otherwise = (
-        robot.reported_matrix != np.eye(robot.joints)
-    ).any() or robot.reported_offset.any()
-    reported = {
-        "matrix": robot.reported_matrix.tolist(),
-        "offset_deg": (robot.reported_offset / _per_degree(robot.chain)).tolist(),
-    }
-    document = {
+    units = _units(robot.chain)
+    document: dict[str, Any] = {
         "name": robot.name,
         "joint_names": robot.joint_names and list(robot.joint_names),
         "chain": format_chain(robot.chain),
-        "joint_limits_deg": (
-            robot.joint_limits / _per_degree(robot.chain)[:, None]
-        ).tolist(),
-        "compliance_urad_per_Nm": (1e6 * robot.compliance).tolist()
-        if robot.compliance_known
-        else None,
-        "reported_joints": reported if counted_otherwise else None,
-        "masses": [
+        "joint_limits_deg": (robot.joint_limits / units[:, None]).tolist(),
+    }
+    if robot.compliance_known:
+        document["compliance_urad_per_Nm"] = (1e6 * robot.compliance).tolist()
+    matrix = robot.reported_matrix
+    if (matrix != np.eye(robot.joints)).any() or robot.reported_offset.any():
+        document["reported_joints"] = {
+            "matrix": matrix.tolist(),
+            "offset_deg": (robot.reported_offset / units).tolist(),
+        }
+    if robot.masses:
+        document["masses"] = [
             vars(mass) | {"centre_m": list(mass.centre_m)} for mass in robot.masses
         ]
-        or None,
-        "gravity_m_s2": list(robot.gravity_m_s2)
-        if robot.gravity_m_s2 != STANDING
-        else None,
+    if robot.gravity_m_s2 != STANDING:
+        document["gravity_m_s2"] = list(robot.gravity_m_s2)
+    document |= {
         "gear_ratio": robot.gear_ratio and list(robot.gear_ratio),
         "compensator": robot.compensator and dict(vars(robot.compensator)),
         "payload_kg": robot.payload_kg,
@@ -164,129 +148,160 @@ def describe_robot(robot: Robot) -> dict[str, Any]:
 
 
 def parse_joint_limits(
-    limits_deg: Sequence[Sequence[float]] | None, chain: Chain, source: str
+    document: Mapping[str, Any], chain: Chain, source: str
 ) -> np.ndarray:
-    """Joint limits (n, 2) in rad, of prismatic joints in m; a turn either way where
-    nothing is known.
+    """Convert joint limits to an array (n, 2) in rad, of prismatic joints in m.
 
-    `limits_deg`: lower and upper limit of each joint; of prismatic ones in metres.
-    Raises `InputError` where there are too few or too many, a lower limit is not below
-    the upper one, or those of a prismatic joint lack.
+    Parameters
+    ----------
+    document : mapping
+        With ``joint_limits_deg``: lower and upper limit of each joint, of prismatic
+        joints in metres. Without them a joint makes one turn either way.
+    chain : Chain
+    source : name of the file for errors
+
+    Raises
+    ------
+    InputError
+        If there are too few or too many limits, a lower limit is not below the upper
+        one, or a prismatic joint has no limits.
     """
-    if limits_deg is None and any(chain.prismatic):
-        joint = chain.prismatic.index(True) + 1
-        raise InputError(
-            source,
-            "joint_limits_deg",
-            f"nothing, but T.(q{joint})",
-            "[lower, upper], for a track in metres",
-        )
-    stated = {
-        "joint_limits_deg": [UNLIMITED_DEG] * chain.coordinates
-        if limits_deg is None
-        else limits_deg
-    }
-    limits = _of_each_joint(stated, "joint_limits_deg", chain.coordinates, source) or ()
+    limits = _get_joint_entries(document, "joint_limits_deg", chain.coordinates, source)
+    if limits is None:
+        if any(chain.prismatic):
+            track = f"nothing, but T.(q{chain.prismatic.index(True) + 1})"
+            allowed = "[lower, upper], for a track in metres"
+            raise InputError(source, "joint_limits_deg", track, allowed)
+        limits = (UNLIMITED_DEG,) * chain.coordinates
     for joint, (low, high) in enumerate(limits):
         if low >= high:
-            raise InputError(
-                source, f"joint_limits_deg[{joint}]", str([low, high]), "[lower, upper]"
-            )
-    return np.array(limits, float) * _per_degree(chain)[:, None]
+            key = f"joint_limits_deg[{joint}]"
+            raise InputError(source, key, str([low, high]), "[lower, upper]")
+    return np.array(limits, float) * _units(chain)[:, None]
 
 
-def _per_degree(chain: Chain) -> np.ndarray:
-    """What one degree, or of prismatic joints one metre, of a robot file is in SI
-    units, ndarray (n,)."""
+def _check_reach(chain: Chain, key: str, source: str) -> None:
+    """Refuse a chain that is longer than any machine."""
+    reach = sum(
+        abs(transform.constant)
+        for transform in chain.transforms
+        if transform.kind == "T"
+    )
+    if reach > LONGEST_REACH_M:
+        limit = f"{LONGEST_REACH_M:g} m at most"
+        allowed = f"lengths in metres (not millimetres) that reach {limit}"
+        raise InputError(source, key, f"a chain that reaches {reach:.4g} m", allowed)
+
+
+def _units(chain: Chain) -> np.ndarray:
+    """Return the unit of each joint in a robot file, a degree or, for prismatic joints,
+    a metre, in SI units, (n,) array."""
     return np.where(chain.prismatic, 1.0, math.radians(1.0))
 
 
-def _masses(
-    described: Sequence[dict[str, Any]], joints: int, source: str
+def _parse_reported_joints(
+    document: Mapping[str, Any], chain: Chain, source: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the matrix and offset of reported joint angles, see `Robot`."""
+    n = chain.coordinates
+    reported = document.get("reported_joints", {})
+    matrix = reported.get("matrix", np.eye(n).tolist())
+    offset = reported.get("offset_deg", [0.0] * n)
+    widths = [len(row) for row in matrix]
+    if widths != [n] * n or len(offset) != n:
+        shape = f"rows of {widths} and {format_count(len(offset), 'offset')}"
+        allowed = f"{n} rows of {n} numbers and {n} offsets"
+        raise InputError(source, "reported_joints", shape, allowed)
+    return np.array(matrix, float), np.array(offset, float) * _units(chain)
+
+
+def _parse_masses(
+    entries: Sequence[dict[str, Any]], joints: int, source: str
 ) -> tuple[Mass, ...]:
-    for index, entry in enumerate(described):
+    """Make masses in the order of the links, each of which may have one mass."""
+    masses = []
+    for index, entry in enumerate(entries):
         if entry["link"] > joints:
+            key = f"masses[{index}].link"
             allowed = f"0 for the column, or a joint up to {joints}"
-            raise InputError(
-                source, f"masses[{index}].link", str(entry["link"]), allowed
-            )
-    found = (
-        Mass(**entry | {"centre_m": tuple(map(float, entry["centre_m"]))})
-        for entry in described
-    )
-    masses = sorted(found, key=attrgetter("link"))
-    twice = next(
-        (one.link for one, other in pairwise(masses) if one.link == other.link), None
-    )
-    if twice is not None:
-        raise InputError(
-            source,
-            "masses",
-            f"link {twice} twice",
-            "each link once, with all that it carries",
-        )
+            raise InputError(source, key, str(entry["link"]), allowed)
+        centre_m = tuple(map(float, entry["centre_m"]))
+        masses.append(Mass(**entry | {"centre_m": centre_m}))
+    masses.sort(key=attrgetter("link"))
+    for mass, successor in pairwise(masses):
+        if mass.link == successor.link:
+            allowed = "each link once, with all that it carries"
+            raise InputError(source, "masses", f"link {mass.link} twice", allowed)
     return tuple(masses)
 
 
-def _of_each_joint(
-    document: Mapping[str, Any], key: str, joints: int, source: str, one: str = "one"
+def _get_joint_entries(
+    document: Mapping[str, Any], key: str, joints: int, source: str, entry: str = "one"
 ) -> tuple[Any, ...] | None:
+    """Return the entries of a list with one entry for each joint, None without it."""
     entries = document.get(key)
-    if entries is not None and len(entries) != joints:
-        raise InputError(
-            source,
-            key,
-            format_count(len(entries), "entry", "entries"),
-            f"{one} for each of the {joints} joints",
-        )
-    return None if entries is None else tuple(entries)
+    if entries is None:
+        return None
+    if len(entries) != joints:
+        count = format_count(len(entries), "entry", "entries")
+        allowed = f"{entry} for each of the {joints} joints"
+        raise InputError(source, key, count, allowed)
+    return tuple(entries)
 
 
-def _links(
-    chain: Chain, described: Mapping[str, Any] | None, source: str
+def _parse_links(
+    chain: Chain, document: Mapping[str, Any] | None, source: str
 ) -> tuple[Link, ...]:
-    """The rigid stretches between joints, each as the tube that it is taken for."""
-    if described is None:
+    """Model each rigid section between joints as a tube, as ``links`` of a robot file
+    describes it."""
+    if document is None:
         return ()
-    odd = {
-        "fixed rotations": any(
-            t.kind == "R" and t.coordinate is None for t in chain.transforms
-        ),
-        "prismatic joints": any(chain.prismatic),
-    }
-    if what := next((what for what, there in odd.items() if there), ""):
-        raise InputError(
-            source,
-            "links",
-            f"a chain with {what}",
-            "links on chains that turn at their joints only",
+    unsupported = ""
+    if any(chain.prismatic):
+        unsupported = "prismatic joints"
+    if any(t.kind == "R" and t.coordinate is None for t in chain.transforms):
+        unsupported = "fixed rotations"
+    if unsupported:
+        allowed = "links on chains that turn at their joints only"
+        raise InputError(source, "links", f"a chain with {unsupported}", allowed)
+    sections = _find_rigid_sections(chain)
+    tubes = []
+    for entry in document["tubes"]:
+        tube = Tube(
+            entry["outer_diameter_m"],
+            entry["wall_m"],
+            1e9 * document["youngs_modulus_GPa"],
+            1e9 * document["shear_modulus_GPa"],
         )
-    rigid = []
+        if 2 * tube.wall_m > tube.outer_diameter_m:
+            wall = f"wall_m {tube.wall_m}"
+            allowed = "at most half the outer_diameter_m"
+            raise InputError(source, "links.tubes", wall, allowed)
+        tubes.append(tube)
+    if len(tubes) not in (1, len(sections)):
+        allowed = f"one for all links or one for each of the {len(sections)}"
+        count = format_count(len(tubes), "tube")
+        raise InputError(source, "links.tubes", count, allowed)
+    # One tube stands for all links.
+    tubes *= len(sections) // len(tubes)
+    return tuple(
+        Link(after, vector_m, tube)
+        for (after, vector_m), tube in zip(sections, tubes, strict=True)
+    )
+
+
+def _find_rigid_sections(chain: Chain) -> list[tuple[int, tuple[float, ...]]]:
+    """Find the rigid sections of a chain of revolute joints without fixed rotations.
+
+    Returns for each section the number of transforms before its far end, and the vector
+    along it, m.
+    """
+    sections = []
     vector = np.zeros(3)
     for index, transform in enumerate(chain.transforms, 1):
         vector[transform.axis] += transform.constant
-        turns = transform.kind == "R"
-        if (turns or index == len(chain.transforms)) and vector.any():
-            rigid.append((index - turns, tuple(vector.tolist())))
+        is_joint = transform.kind == "R"
+        if (is_joint or index == len(chain.transforms)) and vector.any():
+            sections.append((index - is_joint, tuple(vector.tolist())))
             vector[:] = 0.0
-    tubes = described["tubes"]
-    if len(tubes) not in (1, len(rigid)):
-        allowed = f"one for all links or one for each of the {len(rigid)}"
-        raise InputError(
-            source, "links.tubes", format_count(len(tubes), "tube"), allowed
-        )
-    moduli = [1e9 * described[f"{name}_modulus_GPa"] for name in ("youngs", "shear")]
-    for size in tubes:
-        if 2 * size["wall_m"] > size["outer_diameter_m"]:
-            raise InputError(
-                source,
-                "links.tubes",
-                f"wall_m {size['wall_m']}",
-                "at most half the outer_diameter_m",
-            )
-    each = [
-        Tube(size["outer_diameter_m"], size["wall_m"], *moduli) for size in tubes
-    ] * (len(rigid) // len(tubes))
-    return tuple(
-        Link(*stretch, tube) for stretch, tube in zip(rigid, each, strict=True)
-    )
+    return sections

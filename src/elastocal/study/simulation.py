@@ -524,7 +524,8 @@ def draw_experiments(job: Job) -> None:
     params = job.params
     robot = job.wildcards.robot
     chain = parse_chain(params.chain, params.lengths_m, robot)
-    limits = parse_joint_limits(params.joint_limits_deg, chain, robot)
+    document = {"joint_limits_deg": params.joint_limits_deg}
+    limits = parse_joint_limits(document, chain, robot)
     design = RandomDesign(chain, limits, Loading(**params.loading), robot)
     blocks = (
         pack_experiments(

@@ -1,4 +1,4 @@
-"""An arm of springs by pinocchio: poses, Jacobians, and where it yields to under a load
+"""An arm of springs by pinocchio: poses, Jacobians, and deflections under a load
 (equations 1 to 10)."""
 
 from __future__ import annotations
@@ -10,18 +10,29 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-_WORD = re.compile(r"([TR])([xyz])\((-?)([^()]+)\)|\[([^\[\]]+)\]")
+_TOKEN = re.compile(r"([TR])([xyz])\((-?)([^()]+)\)|\[([^\[\]]+)\]")
 _JOINT = re.compile(r"q\d+")
-_JOINTS = {
+_JOINT_MODELS = {
     "T": (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ),
     "R": (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ),
 }
+# Gauss-Legendre rule on (-1, 1) for integrals along a tapered link.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 
 class ChainElement(NamedTuple):
-    """One word of a chain: fixed by `amount` (m or rad), moved by a coordinate, or a
-    measuring point; `kind`: T, R or point."""
+    """One element of a chain: a transform, fixed or moved by a coordinate, or a
+    measuring point.
+
+    Attributes
+    ----------
+    kind : "T", "R" or "point"
+    axis : 0, 1, 2 for x, y, z
+    amount : of a fixed transform, m or rad
+    coordinate : index of the coordinate that moves the transform, or None
+    sign : sense of the coordinate, +1 or -1
+    point : name of a measuring point
+    """
 
     kind: str
     axis: int = 0
@@ -34,62 +45,68 @@ class ChainElement(NamedTuple):
 def parse_chain_elements(
     document: Mapping[str, Any],
 ) -> tuple[list[ChainElement], list[np.ndarray]]:
-    """Words of a robot file's chain, and its rigid stretches as vectors (m).
+    """Parse the chain of a robot file.
 
-    Behind each stretch of an arm with elastic links stand six springs (equation 5):
-    their coordinates follow those of the joints. A point at the end of a link moves
-    with it.
+    If the file has ``links``, six springs follow each link (equation 5); their
+    coordinates follow those of the joints. A point at the end of a link moves with it.
+
+    Returns
+    -------
+    elements : list of chain elements
+    links : vectors (3,) along the rigid links, m
     """
-    joints = len({*_JOINT.findall(document["chain"])})
+    text = document["chain"]
     lengths = document.get("lengths_m", {})
+    springs_per_link = 6 if "links" in document else 0
+    coordinates = len({*_JOINT.findall(text)})
     vector = np.zeros(3)
-    found: list[ChainElement] = []
+    elements: list[ChainElement] = []
     points: list[ChainElement] = []
     links: list[np.ndarray] = []
-    for kind, axis, minus, argument, point in [
-        *_WORD.findall(document["chain"]),
-        ("R", "x", "", "0", ""),
-    ]:
+    # A last rotation by zero ends the last link and its points.
+    for kind, letter, minus, argument, point in _TOKEN.findall(f"{text} Rx(0)"):
         if point:
             points.append(ChainElement("point", point=point))
             continue
-        moves = _JOINT.fullmatch(argument)
-        sign = -1.0 if minus else 1.0
-        place = "xyz".index(axis)
-        if vector.any() and (kind == "R" or moves):
-            springs = joints + 6 * len(links)
-            found += [
-                ChainElement("TR"[k // 3], k % 3, coordinate=springs + k)
-                for k in range(6 * ("links" in document))
-            ]
+        is_joint = _JOINT.fullmatch(argument)
+        if vector.any() and (kind == "R" or is_joint):
+            for k in range(springs_per_link):
+                spring = ChainElement("TR"[k // 3], k % 3, coordinate=coordinates + k)
+                elements.append(spring)
+            coordinates += springs_per_link
             links.append(vector)
             vector = np.zeros(3)
-        found += points
+        elements += points
         points.clear()
-        if moves:
-            found.append(
-                ChainElement(kind, place, coordinate=int(argument[1:]) - 1, sign=sign)
-            )
+        axis = "xyz".index(letter)
+        sign = -1.0 if minus else 1.0
+        if is_joint:
+            joint = int(argument[1:]) - 1
+            elements.append(ChainElement(kind, axis, coordinate=joint, sign=sign))
         elif kind == "R":
-            found.append(
-                ChainElement(
-                    kind, place, sign * np.deg2rad(float(argument.removesuffix("deg")))
-                )
-            )
+            angle = np.deg2rad(float(argument.removesuffix("deg")))
+            elements.append(ChainElement(kind, axis, sign * angle))
         else:
-            found.append(
-                ChainElement(kind, place, sign * float(lengths.get(argument, argument)))
-            )
-            vector[place] += found[-1].amount
-    return found, links
+            length = sign * float(lengths.get(argument, argument))
+            elements.append(ChainElement(kind, axis, length))
+            vector[axis] += length
+    return elements, links
 
 
 class Arm:
-    """An arm with a spring in each joint and, where its file has links, six at the end
-    of each.
+    """An arm with a spring in each joint and, if its file has links, six springs at the
+    end of each.
 
-    `targets`: measuring point and offset (3,) in its frame, m, by the target's name; of
-    all points at `tool_m` by default.
+    Attributes
+    ----------
+    document : contents of the robot file
+    joints : number of joints
+    coordinates : number of joints and springs of links
+    elements, links : see `parse_chain_elements`
+    points : names of the measuring points
+    frames : measuring point and offset (3,), m, by the name of the frame
+    compliance : (joints,) array, rad/(N m)
+    springs : (coordinates, coordinates) array, compliance that the file states
     """
 
     def __init__(
@@ -98,86 +115,97 @@ class Arm:
         targets: Mapping[Any, tuple[str, Any]] | None = None,
         tool_m: Any = (0.0, 0.0, 0.0),
     ) -> None:
-        self.document, self.joints = document, len({*_JOINT.findall(document["chain"])})
-        self.steps, self.links = parse_chain_elements(document)
-        self.points = [step.point for step in self.steps if step.kind == "point"]
-        targets = (
-            {point: (point, tool_m) for point in self.points}
-            if targets is None
-            else targets
-        )
+        """Build the arm of a robot file.
+
+        Parameters
+        ----------
+        document : contents of the robot file
+        targets : mapping, optional
+            Measuring point and offset in its frame, m, by the name of the target. By
+            default each point has a target of its name.
+        tool_m : offset of the default targets
+        """
+        self.document = document
+        self.joints = len({*_JOINT.findall(document["chain"])})
+        self.elements, self.links = parse_chain_elements(document)
+        self.points = [
+            element.point for element in self.elements if element.kind == "point"
+        ]
+        if targets is None:
+            targets = {point: (point, tool_m) for point in self.points}
         # The wrench acts at the last measuring point.
         self.frames = {"wrench": (self.points[-1], np.zeros(3))}
-        self.frames |= {
-            f"target {name}": (point, np.array(offset, float))
-            for name, (point, offset) in targets.items()
-        }
+        for name, (point, offset) in targets.items():
+            self.frames[f"target {name}"] = (point, np.array(offset, float))
+        self._moving = [
+            element for element in self.elements if element.coordinate is not None
+        ]
+        self.coordinates = 1 + max(element.coordinate or 0 for element in self._moving)
         self._model = pin.Model()
-        self._numbers = {}
-        self.moved = [step for step in self.steps if step.coordinate is not None]
+        self._frame_ids: dict[str, int] = {}
+        self._build_model()
+        self._data = self._model.createData()
+        # The file need not state compliances that a campaign identifies.
+        stated = document.get("compliance_urad_per_Nm", [0.0] * self.joints)
+        self.compliance = 1e-6 * np.array(stated, float)
+        self.springs = self._build_stated_springs()
+
+    def _build_model(self) -> None:
+        """Add the joints and frames of all elements to the model of pinocchio."""
         parent = 0
         placement = pin.SE3.Identity()
-        for step in self.steps:
-            if step.kind == "point":
+        for element in self.elements:
+            if element.kind == "point":
                 for name, (point, offset) in self.frames.items():
-                    if point == step.point:
-                        frame = pin.Frame(
-                            name,
-                            parent,
-                            placement * pin.SE3(np.eye(3), offset),
-                            pin.FrameType.OP_FRAME,
-                        )
-                        self._numbers[name] = self._model.addFrame(frame)
-            elif step.coordinate is None:
-                unit = step.amount * np.eye(3)[step.axis]
-                turn = pin.exp3(unit) if step.kind == "R" else np.eye(3)
-                placement = placement * pin.SE3(turn, unit * (step.kind == "T"))
+                    if point == element.point:
+                        target = placement * pin.SE3(np.eye(3), offset)
+                        frame = pin.Frame(name, parent, target, pin.FrameType.OP_FRAME)
+                        self._frame_ids[name] = self._model.addFrame(frame)
+            elif element.coordinate is None:
+                vector = element.amount * np.eye(3)[element.axis]
+                if element.kind == "R":
+                    placement = placement * pin.SE3(pin.exp3(vector), np.zeros(3))
+                else:
+                    placement = placement * pin.SE3(np.eye(3), vector)
             else:
-                parent = self._model.addJoint(
-                    parent,
-                    _JOINTS[step.kind][step.axis](),
-                    placement,
-                    str(self._model.njoints),
-                )
+                joint = _JOINT_MODELS[element.kind][element.axis]()
+                name = str(self._model.njoints)
+                parent = self._model.addJoint(parent, joint, placement, name)
                 placement = pin.SE3.Identity()
-        self._data = self._model.createData()
-        self.coordinates = 1 + max(step.coordinate or 0 for step in self.moved)
-        # Where a campaign has to identify them, the file need not state any.
-        self.compliance = 1e-6 * np.array(
-            document.get("compliance_urad_per_Nm", [0.0] * self.joints), float
-        )
-        self.springs = self._stated_springs()
 
-    def spring_matrix(
+    def build_springs(
         self, joints: np.ndarray, links: Mapping[int, np.ndarray]
     ) -> np.ndarray:
-        """Compliance (C, C) of all coordinates from that of the joints (n,) and of
-        links (6, 6) by their number."""
-        found = np.diag(self.extend(joints))
+        """Build the compliance (C, C) of all coordinates from that of the joints (n,)
+        and of links (6, 6) by their number."""
+        compliance = np.diag(self.extend(joints))
         for number, block in links.items():
-            place = slice(self.joints + 6 * number, self.joints + 6 * number + 6)
-            found[place, place] = block
-        return found
+            start = self.joints + 6 * number
+            compliance[start : start + 6, start : start + 6] = block
+        return compliance
 
     def pose(
         self, coordinates: np.ndarray, target: Any
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Position (m) and rotation of a target."""
-        pin.framesForwardKinematics(self._model, self._data, self.ordered(coordinates))
-        placed = self._data.oMf[self._numbers[f"target {target}"]]
-        return placed.translation.copy(), placed.rotation.copy()
+        """Compute the position (m) and rotation of a target."""
+        pin.framesForwardKinematics(self._model, self._data, self.order(coordinates))
+        placement = self._data.oMf[self._frame_ids[f"target {target}"]]
+        return placement.translation.copy(), placement.rotation.copy()
 
     def jacobian(self, coordinates: np.ndarray, *target: Any) -> np.ndarray:
-        """Jacobian (6, coordinates), linear over angular, base axes, of a target or,
-        without one, of the last point."""
-        frame = self._numbers[f"target {target[0]}" if target else "wrench"]
-        aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        """Compute the Jacobian (6, coordinates), linear over angular, base axes, of a
+        target or, without one, of the last point."""
+        frame = self._frame_ids[f"target {target[0]}" if target else "wrench"]
         columns = pin.computeFrameJacobian(
-            self._model, self._data, self.ordered(coordinates), frame, aligned
+            self._model,
+            self._data,
+            self.order(coordinates),
+            frame,
+            pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
         )
-        return self.collected(np.reshape(columns, (6, -1)))
+        return self.collect(np.reshape(columns, (6, -1)))
 
-    def loaded(
+    def deflect(
         self,
         springs: np.ndarray,
         angles: np.ndarray,
@@ -185,12 +213,24 @@ class Arm:
         passes: int,
         *at: str,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates to which springs (C, C) yield, and the generalized forces there;
-        of one pass at the commanded pose.
+        """Compute the coordinates of the deflected arm by fixed-point iteration.
 
-        `at`: the target that the wrench acts on, where it is not the last point.
+        Parameters
+        ----------
+        springs : (C, C) array, compliance
+        angles : (n,) array, commanded joint angles
+        wrench : (6,) array
+        passes : number of iterations; the first one evaluates the forces at the
+            commanded pose
+        at : target on which the wrench acts; none for the last point
+
+        Returns
+        -------
+        coordinates : (C,) array
+        forces : (C,) array, generalized forces of the last iteration
         """
-        coordinates = commanded = self.extend(angles)
+        commanded = self.extend(angles)
+        coordinates = commanded
         for _ in range(passes):
             forces = self.jacobian(coordinates, *at).T @ wrench
             coordinates = commanded + springs @ forces
@@ -199,74 +239,79 @@ class Arm:
     def regressor(
         self, angles: np.ndarray, wrench: np.ndarray, target: Any, *at: str
     ) -> np.ndarray:
-        """Matrix A (6, n) of equation 10."""
-        torques = self.jacobian(self.extend(angles), *at).T @ wrench
-        return (self.jacobian(self.extend(angles), target) * torques)[:, : self.joints]
+        """Compute matrix A (6, n) of equation 10; `at` as in `deflect`."""
+        coordinates = self.extend(angles)
+        torques = self.jacobian(coordinates, *at).T @ wrench
+        return (self.jacobian(coordinates, target) * torques)[:, : self.joints]
 
     def extend(self, joint_angles: np.ndarray) -> np.ndarray:
-        """Coordinates of joints with all other springs at rest."""
+        """Return coordinates of joint angles with all other springs at rest."""
         return np.concatenate([joint_angles, np.zeros(self.coordinates - self.joints)])
 
-    def ordered(self, coordinates: np.ndarray) -> np.ndarray:
-        """Coordinates as the joints of the model have them."""
+    def order(self, coordinates: np.ndarray) -> np.ndarray:
+        """Return coordinates in the order and with the sign of the model's joints."""
         return np.array(
-            [step.sign * coordinates[step.coordinate] for step in self.moved]
+            [element.sign * coordinates[element.coordinate] for element in self._moving]
         )
 
-    def collected(self, columns: np.ndarray) -> np.ndarray:
-        """Columns (..., joints of the model) as those of the coordinates, of which one
-        may move several."""
-        found = np.zeros((*columns.shape[:-1], self.coordinates))
-        for number, step in enumerate(self.moved):
-            found[..., step.coordinate] += step.sign * columns[..., number]
-        return found
+    def collect(self, columns: np.ndarray) -> np.ndarray:
+        """Sum columns (..., joints of the model) for each coordinate, which may move
+        several joints of the model."""
+        collected = np.zeros((*columns.shape[:-1], self.coordinates))
+        for number, element in enumerate(self._moving):
+            column = element.sign * columns[..., number]
+            collected[..., element.coordinate] += column
+        return collected
 
-    def _stated_springs(self) -> np.ndarray:
-        """Springs of the file; links that are named but not described yield as whoever
-        asks for them says."""
+    def _build_stated_springs(self) -> np.ndarray:
+        """Build the springs that the file states; links without tubes are rigid until
+        the caller states their compliance."""
         material = self.document.get("links") or {"tubes": []}
+        tubes = material["tubes"]
         links = {}
-        for number, vector in enumerate(self.links if material["tubes"] else ()):
-            tube = material["tubes"][number if len(material["tubes"]) > 1 else 0]
+        for number, vector in enumerate(self.links if tubes else ()):
+            tube = tubes[number if len(tubes) > 1 else 0]
             outer = tube["outer_diameter_m"]
-            inner = tube["outer_diameter_m"] - 2 * tube["wall_m"]
+            inner = outer - 2 * tube["wall_m"]
             area = np.pi * (outer**2 - inner**2) / 4
-            second = np.pi * (outer**4 - inner**4) / 64
-            young = 1e9 * material["youngs_modulus_GPa"]
-            shear = 1e9 * material["shear_modulus_GPa"]
+            second_moment = np.pi * (outer**4 - inner**4) / 64
+            youngs_modulus = 1e9 * material["youngs_modulus_GPa"]
+            shear_modulus = 1e9 * material["shear_modulus_GPa"]
             links[number] = compute_link_compliance(
                 vector,
-                1 / (young * second),
-                1 / (shear * 2 * second),
+                1 / (youngs_modulus * second_moment),
+                1 / (shear_modulus * 2 * second_moment),
                 0.0,
-                1 / (young * area),
+                1 / (youngs_modulus * area),
             )
-        return self.spring_matrix(self.compliance, links)
+        return self.build_springs(self.compliance, links)
 
 
 def compute_link_compliance(
     vector: np.ndarray, bending: float, torsion: float, taper: float, axial: float = 0.0
 ) -> np.ndarray:
-    """Compliance (6, 6) of a link at its far end: force and moment there integrated
-    along it (Castigliano's theorem).
+    """Compute the compliance (6, 6) of a link at its far end by integration along it
+    (Castigliano's theorem).
 
-    `bending`, `torsion`, `axial`: 1/EI, 1/GJ and 1/EA of the uniform link that a force
-    shifts and a moment along twists as far. `taper`: share by which the diameter falls
-    along the link.
+    Parameters
+    ----------
+    vector : (3,) array, from the near to the far end, m
+    bending, torsion, axial : 1/EI, 1/GJ and 1/EA of a uniform link
+        The tapered link has the same deflection by a lateral force and the same twist.
+    taper : share by which the diameter decreases along the link
     """
     length = float(np.linalg.norm(vector))
-    along = np.outer(vector, vector) / length**2
-    places = 0.5 * (1 + _NODES)
-    each = 0.5 * length * _WEIGHTS / (1 - taper * places) ** 3
-    local = np.zeros((6, 6))
-    local[:3, :3] = axial * along
-    local[3:, 3:] = (
-        bending * length / 3 / (each @ (1 - places) ** 2) * (np.eye(3) - along)
-    )
-    local[3:, 3:] += torsion * length / each.sum() * along
-    total = np.zeros((6, 6))
-    lever = np.eye(6)
-    for place, softer in zip(places, each, strict=True):
-        lever[3:, :3] = pin.skew((1 - place) * vector)
-        total += softer * lever.T @ local @ lever
-    return total
+    axial_projection = np.outer(vector, vector) / length**2
+    positions = 0.5 * (1 + _NODES)
+    softness = 0.5 * length * _WEIGHTS / (1 - taper * positions) ** 3
+    bending_scale = bending * length / 3 / (softness @ (1 - positions) ** 2)
+    section = np.zeros((6, 6))
+    section[:3, :3] = axial * axial_projection
+    section[3:, 3:] = bending_scale * (np.eye(3) - axial_projection)
+    section[3:, 3:] += torsion * length / softness.sum() * axial_projection
+    compliance = np.zeros((6, 6))
+    transport = np.eye(6)
+    for position, weight in zip(positions, softness, strict=True):
+        transport[3:, :3] = pin.skew((1 - position) * vector)
+        compliance += weight * transport.T @ section @ transport
+    return compliance

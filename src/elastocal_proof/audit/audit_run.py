@@ -1,5 +1,5 @@
-"""The whole audit: checksum and settings of every file of a finished run, and what
-works it out again, as table and page."""
+"""The whole audit of a finished run: checksum and settings of every file, and the
+checks that compute its values again, as a table and a page."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from dataclasses import replace
 from importlib import resources
 from typing import Any
 
-import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 from jinja2 import Environment
@@ -21,226 +20,219 @@ from elastocal.io.records import RECORDS, list_recorded_files
 from elastocal_proof.audit import campaigns, fits, study
 from elastocal_proof.audit.finished_run import Finding, FinishedRun, require
 
+_Check = Callable[..., Iterator[Finding]]
+
 _SHA = "hashlib, SHA-256"
-_OWN_WORDS = "its own metadata"
-# By what every file is checked, whatever it holds; other checks work something out
-# again.
-OF_EVERY_FILE = ("its record", _SHA, _OWN_WORDS)
-# What works a file out again, by the form of its name; what stands in braces are
-# arguments.
-CHECKS = tuple(
-    (form, check)
-    for room in (study, campaigns, fits)
-    for form, check in room.CHECKS.items()
-)
-_PATTERNS = [
-    re.compile(re.sub(r"{(\w+)}", r"(?P<\1>[^/]+)", form.replace(".", r"\.")))
-    for form, _ in CHECKS
+_METADATA = "its own metadata"
+# Checks of every file, whatever its contents, in terms of `Finding.by`. All other
+# checks compute something again.
+OF_EVERY_FILE = ("its record", _SHA, _METADATA)
+# Checks that compute a file again, by the pattern of its name. Names in braces are
+# arguments of the check.
+CHECKS: list[tuple[str, _Check]] = [
+    item for module in (study, campaigns, fits) for item in module.CHECKS.items()
 ]
 COLUMNS = ("file", "checked", "by", "compared", "worst", "holds", "note")
+# Findings that the page shows in full.
+_MOST_SHOWN = 200
 
 
 def audit_run(run: FinishedRun, only: Collection[str] | None = None) -> list[Finding]:
-    """Check a finished run: every file that a job has recorded, or those that are
-    named.
+    """Check every file that a job of a finished run has recorded, or those in `only`.
 
-    A check that cannot be carried out, for a file that cannot be read or has no such
-    column, does not hold.
+    A check that fails with an error, because a file cannot be read or lacks a column,
+    does not hold.
     """
-    found = []
+    findings = []
     for file, digest in list_recorded_files(run.folder).items():
-        # What an audit itself wrote is not audited.
+        # The output of an earlier audit is not audited by default.
         if file in only if only is not None else not file.startswith("reports/audit."):
-            found.append(replace(check_checksum(run, file, digest), file=file))
-            found += _recompute(run, file) if run.has(file) else ()
-    return found or [
-        Finding(
-            "files that a job recorded",
-            "counting",
-            0,
-            np.inf,
-            "none; is the run finished?",
-            RECORDS.as_posix(),
-        )
-    ]
+            findings.append(replace(check_checksum(run, file, digest), file=file))
+            if run.has(file):
+                findings += _recompute(run, file)
+    if findings:
+        return findings
+    note = "none; is the run finished?"
+    missing = require(
+        "files that a job recorded", "counting", holds=False, note=note, count=0
+    )
+    return [replace(missing, file=RECORDS.as_posix())]
 
 
 def find_checks(
     file: str,
-) -> list[tuple[str, Callable[..., Iterator[Finding]], dict[str, str]]]:
-    """The checks of a file: the form of its name, what works it out again, and with
-    which arguments."""
-    pairs = zip(CHECKS, _PATTERNS, strict=True)
-    return [
-        (*check, match.groupdict())
-        for check, pattern in pairs
-        if (match := pattern.fullmatch(file))
-    ]
+) -> list[tuple[str, _Check, dict[str, str]]]:
+    """Find the checks that compute a file again: the pattern of its name, the check,
+    and its arguments."""
+    checks = []
+    for pattern, check in CHECKS:
+        expression = re.sub(r"{(\w+)}", r"(?P<\1>[^/]+)", pattern.replace(".", r"\."))
+        match = re.fullmatch(expression, file)
+        if match:
+            checks.append((pattern, check, match.groupdict()))
+    return checks
 
 
 def tabulate_findings(findings: Iterable[Finding]) -> pd.DataFrame:
-    """Findings as rows of audit.csv."""
-    return pd.DataFrame(
-        [{name: getattr(each, name) for name in COLUMNS} for each in findings],
-        columns=[*COLUMNS],
-    )
+    """Tabulate findings as rows of audit.csv."""
+    rows = [[getattr(finding, name) for name in COLUMNS] for finding in findings]
+    return pd.DataFrame(rows, columns=[*COLUMNS])
 
 
 def render_page(table: pd.DataFrame, facts: Mapping[str, str]) -> str:
-    """audit.html, which asks nothing of the network; `table`: from `as_table`; `facts`:
-    what heads it, such as the seed."""
-    labelled = table.assign(kind=table["file"].map(_kind_of))
-    of_every_file = labelled["by"].isin(OF_EVERY_FILE)
-    wrong = table[~table["holds"]]
-    recomputed = labelled[~of_every_file]
-    alike = labelled[
-        of_every_file & ~labelled["kind"].isin(labelled["kind"][~of_every_file])
-    ]
-    template = (
-        resources.files("elastocal_proof.audit")
-        .joinpath("audit.html")
-        .read_text("utf-8")
-    )
-    shown: dict[str, Any] = {
-        "facts": facts,
-        "wrong": wrong.head(200).to_dict("records"),
-    }
-    shown |= {"recomputed": _by_kind(recomputed), "rest": _by_kind(alike)}
-    shown |= {
-        "files": table["file"].nunique(),
-        "files_again": recomputed["file"].nunique(),
-        "checks": len(table),
-    }
-    shown |= {"values": int(table["compared"].sum()), "failed": len(wrong)}
-    return (
-        Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-        .from_string(template)
-        .render(shown)
+    """Render audit.html, which needs no network.
+
+    Parameters
+    ----------
+    table : from `tabulate_findings`
+    facts : head of the page, such as the seed
+    """
+    labelled = table.assign(kind=table["file"].map(_name_kind))
+    recomputed = labelled[~labelled["by"].isin(OF_EVERY_FILE)]
+    unchanged = labelled[~labelled["kind"].isin(recomputed["kind"])]
+    failed = table[~table["holds"]]
+    page = resources.files("elastocal_proof.audit").joinpath("audit.html")
+    environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    return environment.from_string(page.read_text("utf-8")).render(
+        facts=facts,
+        wrong=failed.head(_MOST_SHOWN).to_dict("records"),
+        recomputed=_summarize_kinds(recomputed),
+        rest=_summarize_kinds(unchanged),
+        files=table["file"].nunique(),
+        files_again=recomputed["file"].nunique(),
+        checks=len(table),
+        values=int(table["compared"].sum()),
+        failed=len(failed),
     )
 
 
-def _by_kind(labelled: pd.DataFrame) -> list[dict[str, Any]]:
-    """Files that are made alike as one row each."""
+def _summarize_kinds(labelled: pd.DataFrame) -> list[dict[str, Any]]:
+    """Summarize the findings of each kind of files in one row."""
     rows = []
-    for kind, some in labelled.groupby("kind", sort=True):
-        words = " ".join(
-            (check.__doc__ or "").split("\n")[0]
-            for _, check, _ in find_checks(some["file"].iloc[0])
-        )
+    for kind, findings in labelled.groupby("kind", sort=True):
+        summaries = [
+            (check.__doc__ or "").partition("\n")[0]
+            for _, check, _ in find_checks(findings["file"].iloc[0])
+        ]
         row = {
             "kind": kind,
-            "meaning": words,
-            "files": some["file"].nunique(),
-            "checks": len(some),
+            "meaning": " ".join(summaries),
+            "files": findings["file"].nunique(),
+            "checks": len(findings),
+            "worst": findings["worst"].max(),
+            "failed": int((~findings["holds"]).sum()),
+            "by": ", ".join(dict.fromkeys(filter(None, findings["by"]))),
         }
-        row |= {"worst": some["worst"].max(), "failed": int((~some["holds"]).sum())}
-        rows.append(row | {"by": ", ".join(dict.fromkeys(filter(None, some["by"])))})
+        rows.append(row)
     return rows
 
 
-def _kind_of(file: str) -> str:
-    """Files that are made alike, by the form of their names, or where none is worked
-    out again by the folder and the ending."""
-    form = next((form for form, _, _ in find_checks(file)), "")
+def _name_kind(file: str) -> str:
+    """Name the kind of a file: the pattern of its name with asterisks or, if nothing
+    computes it again, its folder and suffix."""
+    for pattern, _, _ in find_checks(file):
+        return re.sub(r"\{\w+\}", "*", pattern)
     folder, _, name = file.rpartition("/")
-    return re.sub(r"\{\w+\}", "*", form) or f"{folder}/*{name[name.find('.') :]}"
+    return f"{folder}/*{name[name.find('.') :]}"
 
 
 def _recompute(run: FinishedRun, file: str) -> Iterator[Finding]:
-    """Findings of one file; whatever a damaged file makes of a check is a finding
-    too."""
-    checks = [(check_provenance, dict[str, str]())] * file.endswith(".parquet") + [
-        each[1:] for each in find_checks(file)
+    """Check the values of one file; an error that a damaged file causes is a finding as
+    well."""
+    checks: list[tuple[_Check, dict[str, str]]] = [
+        (check, arguments) for _, check, arguments in find_checks(file)
     ]
+    if file.endswith(".parquet"):
+        checks.insert(0, (check_provenance, {}))
     for check, arguments in checks:
         try:
             for finding in check(run, file, **arguments):
                 yield replace(finding, file=file)
         except (ArithmeticError, LookupError, OSError, TypeError, ValueError) as error:
-            note = f"{type(error).__name__}: {next(iter(str(error).splitlines()), '')}"[
-                :200
-            ]
-            yield replace(
-                require(f"check {check.__name__}", "", False, note), file=file
-            )
+            message = str(error).partition("\n")[0]
+            note = f"{type(error).__name__}: {message}"[:200]
+            name = check.__name__.replace("_", " ")
+            yield replace(require(name, "", holds=False, note=note), file=file)
 
 
 def check_checksum(run: FinishedRun, file: str, digest: str) -> Finding:
-    """Whether a file holds what its job wrote."""
+    """Check that a file holds the bytes that its job wrote, by their recorded
+    digest."""
     if not run.has(file):
-        return require("the file is there", "its record", False, "it is missing")
-    found = hashlib.sha256((run.folder / file).read_bytes()).hexdigest()
+        return require(
+            "the file is there", "its record", holds=False, note="it is missing"
+        )
+    actual = hashlib.sha256((run.folder / file).read_bytes()).hexdigest()
     return require(
         "bytes as its job wrote them",
         _SHA,
-        found == digest,
-        f"{found[:12]}, recorded {digest[:12]}",
+        actual == digest,
+        f"{actual[:12]}, recorded {digest[:12]}",
     )
 
 
 def check_provenance(run: FinishedRun, file: str) -> Iterator[Finding]:
     """What a Parquet file of the pipeline says of its own settings, against its path,
     config.yaml and files of robots."""
-    origin = json.loads(
-        (pq.ParquetFile(run.folder / file).metadata.metadata or {}).get(
-            b"elastocal.provenance", "null"
-        )
-    )
-    if origin is None:
+    metadata = pq.ParquetFile(run.folder / file).metadata.metadata or {}
+    if b"elastocal.provenance" not in metadata:
         return
+    origin = json.loads(metadata[b"elastocal.provenance"])
     configuration = origin.get("configuration", {})
-    version = origin.get("elastocal_version")
-    digest = hashlib.sha256(
-        json.dumps(configuration, sort_keys=True).encode()
-    ).hexdigest()[:16]
+    text = json.dumps(configuration, sort_keys=True)
+    digest = hashlib.sha256(text.encode()).hexdigest()[:16]
     yield require(
         "digest of its configuration",
-        _OWN_WORDS,
+        _METADATA,
         digest == origin.get("configuration_sha256"),
         digest,
     )
+    version = origin.get("elastocal_version")
     yield require(
-        "version of the package", _OWN_WORDS, version == __version__, str(version)
+        "version of the package", _METADATA, version == __version__, str(version)
     )
-    place = {
-        name: str(origin[name])
+    stated = {
+        name: f"{origin[name]}um" if name == "noise" else str(origin[name])
         for name in ("robot", "noise", "strategy", "campaign")
         if name in origin
     }
     parts = file.removesuffix(".parquet").split("/")
-    off = [
-        f"{name} {word}"
-        for name, word in place.items()
-        if word + "um" * (name == "noise") not in parts
-    ]
+    wrong = [f"{name} {part}" for name, part in stated.items() if part not in parts]
     yield require(
-        "made for where it lies", _OWN_WORDS, not off, ", ".join(off), len(place)
+        "made for where it lies", _METADATA, not wrong, ", ".join(wrong), len(stated)
     )
-    tool = run.configuration["interpretations"]["tool_offset_m"]
-    robot = run.robots.get(place.get("robot", ""))
-    expected: dict[str, Any] = {
-        "tool_offset_m": tool,
-        "wrench_at": run.wrench_at,
-        "seed": run.seed,
-    }
-    if robot is not None:
-        expected |= {
-            "robot": robot,
-            "chain": robot["chain"],
-            "lengths_m": robot.get("lengths_m", {}),
-        }
-    if place.get("strategy") in run.strategies:
-        expected["strategy"] = run.strategies[place["strategy"]]
-    inner = configuration | configuration.get("study", {})
-    off = [
+    expected = _list_expected_settings(run, stated)
+    actual = configuration | configuration.get("study", {})
+    # JSON turns tuples into lists.
+    wrong = [
         name
-        for name, value in expected.items()
-        if name in inner and json.loads(json.dumps(value)) != inner[name]
+        for name, setting in expected.items()
+        if name in actual and json.loads(json.dumps(setting)) != actual[name]
     ]
     yield require(
         "made by what is configured",
-        _OWN_WORDS,
-        not off,
-        f"not the configured {', '.join(off)}",
+        _METADATA,
+        not wrong,
+        f"not the configured {', '.join(wrong)}",
         len(expected),
     )
+
+
+def _list_expected_settings(
+    run: FinishedRun, stated: Mapping[str, str]
+) -> dict[str, Any]:
+    """List the configured settings for the robot and strategy that a file states."""
+    settings: dict[str, Any] = {
+        "tool_offset_m": run.configuration["interpretations"]["tool_offset_m"],
+        "wrench_at": run.wrench_at,
+        "seed": run.seed,
+    }
+    robot = run.robots.get(stated.get("robot", ""))
+    if robot is not None:
+        settings["robot"] = robot
+        settings["chain"] = robot["chain"]
+        settings["lengths_m"] = robot.get("lengths_m", {})
+    strategy = run.strategies.get(stated.get("strategy", ""))
+    if strategy is not None:
+        settings["strategy"] = strategy
+    return settings

@@ -1,10 +1,11 @@
-"""Campaigns: simulated ones drawn again, the split of the poses, and seals of the blind
-proof."""
+"""Audit of campaigns: simulated ones drawn again, the split of the poses, and seals of
+the blind proof."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -22,9 +23,9 @@ from elastocal_proof.audit.finished_run import (
     require,
 )
 
-# Positions are some metres, rotations some radians; near half a turn rotation vectors
-# lose digits.
-_DIGITS = 1e-10
+# Relative tolerance: positions are some metres and rotations some radians, and near
+# half a turn rotation vectors lose digits.
+_TOLERANCE = 1e-10
 
 
 def check_simulated_campaign(
@@ -32,130 +33,131 @@ def check_simulated_campaign(
 ) -> Iterator[Finding]:
     """Every angle, load and noise of a simulated campaign from its stream, every pose
     of the elastic arm by pinocchio."""
-    path = run.folder / f"config/campaigns/{campaign}.yaml"
-    source = yaml.safe_load(path.read_text("utf-8")) if path.is_file() else {}
-    if source.get("source") != "simulated":
+    config = run.folder / "config"
+    path = config / f"campaigns/{campaign}.yaml"
+    plan = yaml.safe_load(path.read_text("utf-8")) if path.is_file() else {}
+    if plan.get("source") != "simulated":
         return
-    document = yaml.safe_load(
-        (run.folder / f"config/robots/{source['robot']}.yaml").read_text("utf-8")
-    )
-    arm = Arm(document)
-    draws = open_philox_stream(run.seed, campaign, "campaign")
-    table = run.table(file)
-    low, high = np.deg2rad(document["joint_limits_deg"]).T
-    angles = low + (high - low) * draws.random((source["poses"], arm.joints))
-    normal = draws.standard_normal((source["poses"], 3))
-    forces = source["force_N"] * normal / np.linalg.norm(normal, axis=1)[:, None]
-    # Without load and under the whole one the first poses are approached again and
-    # again.
-    visits = [
-        (pose, load, repeat)
-        for pose in range(source["poses"])
-        for load in range(len(source["ladder"]))
-        for repeat in range(
-            source["repeats"] if pose < source["repeated_poses"] and load < 2 else 1
-        )
+    path = config / f"robots/{plan['robot']}.yaml"
+    arm = Arm(yaml.safe_load(path.read_text("utf-8")))
+    stream = open_philox_stream(run.seed, campaign, "campaign")
+    visits, angles, wrenches = _draw_visits(arm, plan, stream)
+    deflected = [
+        arm.deflect(arm.springs, q, wrench, 1)[0]
+        for q, wrench in zip(angles, wrenches, strict=True)
     ]
-    pose, load, _ = np.transpose(visits)
-    of_pose = angles[pose]
-    force = np.array(source["ladder"])[load, None] * forces[pose]
-    wrenches = np.concatenate([force, np.cross(source["offset_m"], force)], axis=1)
-    loaded = [
-        arm.loaded(arm.springs, *each, 1)[0]
-        for each in zip(of_pose, wrenches, strict=True)
-    ]
-    for point in source["points"]:
-        position, turned = (draws.standard_normal((len(visits), 3)) for _ in range(2))
-        exact = [arm.pose(coordinates, point) for coordinates in loaded]
-        seen = [
-            (
-                *(place + source["noise_m"] * off),
-                *pin.log3(pin.exp3(source["noise_rad"] * turn) @ rotation),
-            )
-            for (place, rotation), off, turn in zip(
-                exact, position, turned, strict=True
-            )
-        ]
-        rows = table[table["target"] == point]
-        columns = [
+    for point in plan["points"]:
+        noise = plan["noise_m"] * stream.standard_normal((len(visits), 3))
+        turns = plan["noise_rad"] * stream.standard_normal((len(visits), 3))
+        measured = []
+        for number, coordinates in enumerate(deflected):
+            position, rotation = arm.pose(coordinates, point)
+            rotation = pin.exp3(turns[number]) @ rotation
+            measured.append([*(position + noise[number]), *pin.log3(rotation)])
+        rows = run.table(file).query("target == @point")
+        for name, columns, expected in (
             ("visits", ["pose", "load", "repeat"], visits),
-            ("wrenches", [*WRENCH], wrenches),
-        ]
-        columns += [
-            ("joint angles", [f"q{j}" for j in range(1, arm.joints + 1)], of_pose)
-        ]
-        for words, names, expected in [
-            *columns,
-            ("measured poses", [*POSITION, "rx", "ry", "rz"], seen),
-        ]:
+            ("wrenches", WRENCH, wrenches),
+            ("joint angles", [f"q{j}" for j in range(1, arm.joints + 1)], angles),
+            ("measured poses", [*POSITION, "rx", "ry", "rz"], measured),
+        ):
             yield compare(
-                f"{words} of {point}",
+                f"{name} of {point}",
                 "pinocchio, numpy's Philox stream",
-                rows[names],
+                rows[[*columns]],
                 expected,
-                _DIGITS,
+                _TOLERANCE,
             )
+
+
+def _draw_visits(
+    arm: Arm, plan: Mapping[str, Any], stream: np.random.Generator
+) -> tuple[list[tuple[int, int, int]], np.ndarray, np.ndarray]:
+    """Draw the visits of a campaign in the order of its file.
+
+    Returns
+    -------
+    visits : N times pose, load and repeat
+    angles : (N, n) array, rad
+    wrenches : (N, 6) array
+    """
+    poses = plan["poses"]
+    low, high = np.deg2rad(arm.document["joint_limits_deg"]).T
+    angles = low + (high - low) * stream.random((poses, arm.joints))
+    normal = stream.standard_normal((poses, 3))
+    forces = plan["force_N"] * normal / np.linalg.norm(normal, axis=1)[:, None]
+    visits = []
+    for pose in range(poses):
+        for load in range(len(plan["ladder"])):
+            # The first poses are approached several times without and with full load.
+            repeated = pose < plan["repeated_poses"] and load < 2
+            repeats = plan["repeats"] if repeated else 1
+            visits += [(pose, load, repeat) for repeat in range(repeats)]
+    pose_index, load_index, _ = np.transpose(visits)
+    force = np.array(plan["ladder"])[load_index, None] * forces[pose_index]
+    moment = np.cross(plan["offset_m"], force)
+    return visits, angles[pose_index], np.concatenate([force, moment], axis=1)
 
 
 def check_split(run: FinishedRun, file: str, campaign: str) -> Iterator[Finding]:
     """Fitted and held-out measurements are those of the campaign's file, each once, and
     share no pose."""
+    source = f"data/campaigns/{campaign}/measurements.parquet"
+    facts = run.document(f"results/loop/{campaign}/campaign.json")
+    # The poses of a separate held-out campaign have numbers of their own.
+    if facts.get("held_out") is not None or not run.has(source):
+        return
     fitted = run.table(file)
     held_out = run.table(file.replace("training", "held_out"))
-    source = f"data/campaigns/{campaign}/measurements.parquet"
-    # Of another campaign poses are numbered anew.
-    if run.document(f"results/loop/{campaign}/campaign.json").get(
-        "held_out"
-    ) is None and run.has(source):
-        shared = set.intersection(
-            *(
-                set(zip(frame["session"], frame["pose"], strict=True))
-                for frame in (fitted, held_out)
-            )
-        )
-        yield require(
-            "no pose is fitted and held out",
-            "counting",
-            not shared,
-            f"{sorted(shared)[:3]}",
-            len(fitted),
-        )
-        original = run.table(source)
-        rows = pd.concat([fitted, held_out]).sort_values("row")
-        yield compare(
-            "every row of the campaign once",
-            "counting",
-            rows["row"],
-            np.arange(1, len(original) + 1),
-            0.0,
-        )
-        yield compare(
-            "positions as measured",
-            "the campaign's file",
-            rows[list(POSITION)],
-            original[list(POSITION)],
-            0.0,
-        )
+    fitted_poses, held_out_poses = (
+        set(zip(frame["session"], frame["pose"], strict=True))
+        for frame in (fitted, held_out)
+    )
+    shared = fitted_poses & held_out_poses
+    yield require(
+        "no pose is fitted and held out",
+        "counting",
+        not shared,
+        f"{sorted(shared)[:3]}",
+        len(fitted),
+    )
+    original = run.table(source)
+    rows = pd.concat([fitted, held_out]).sort_values("row")
+    yield compare(
+        "every row of the campaign once",
+        "counting",
+        rows["row"],
+        np.arange(1, len(original) + 1),
+        0.0,
+    )
+    yield compare(
+        "positions as measured",
+        "the campaign's file",
+        rows[list(POSITION)],
+        original[list(POSITION)],
+        0.0,
+    )
 
 
 def check_seals(run: FinishedRun, file: str) -> Iterator[Finding]:
     """Every ground truth of the blind proof is what was sealed, and every sealed one is
     there."""
-    there = {
+    digests = {
         path.name: hashlib.sha256(path.read_bytes()).hexdigest()
         for path in (run.folder / "data/sealed").glob("*/*.json")
     }
-    lines = [
-        line.partition("  ")
-        for line in (run.folder / file).read_text("utf-8").splitlines()
-    ]
-    off = [name for digest, _, name in lines if there.get(name) != digest]
+    seals = (run.folder / file).read_text("utf-8").splitlines()
+    broken = []
+    for seal in seals:
+        digest, _, name = seal.partition("  ")
+        if digests.get(name) != digest:
+            broken.append(name)
     yield require(
         "ground truths as they were sealed",
         "the seal",
-        not off,
-        ", ".join(off[:3]),
-        len(lines),
+        not broken,
+        ", ".join(broken[:3]),
+        len(seals),
     )
 
 

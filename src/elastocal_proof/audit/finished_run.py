@@ -1,5 +1,5 @@
-"""What an audit has at hand, by pyarrow and pandas alone, and what it finds: each check
-of a file is one row."""
+"""The files of a finished run, read by pyarrow and pandas alone, and the findings of an
+audit: each check of a file is one row."""
 
 from __future__ import annotations
 
@@ -25,12 +25,25 @@ POSITION = ("x", "y", "z")
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 COMPONENTS = ("dx", "dy", "dz", "rx", "ry", "rz")
 
+# Relative difference of two programs that compute the same in double precision, in
+# another order.
+ROUNDING = 1e-9
+
 
 class FinishedRun:
-    """A finished run: its folder, config.yaml, robot and strategy files by name, and
-    how many rows of a file are recomputed.
+    """A finished run and its configuration.
 
-    Files, arms and deflections are kept once they have been read.
+    Files, arms and deflections are cached.
+
+    Attributes
+    ----------
+    folder : folder of the run
+    configuration : contents of config.yaml
+    robots, strategies : contents of their files, by name
+    sample : number of rows of a large file that are computed again
+    seed : seed of the random numbers
+    wrench_at : "end_effector" or "measuring_point" (interpretation R6)
+    table, experiments, deflections, arm : cached readers
     """
 
     def __init__(
@@ -43,102 +56,100 @@ class FinishedRun:
     ) -> None:
         self.folder = folder
         self.configuration = configuration
-        self.sample = sample
         self.robots = robots
         self.strategies = strategies
+        self.sample = sample
         self.seed = int(configuration["seed"])
-        read = configuration["interpretations"]
-        self.wrench_at = str(read["wrench_at"])
-        # Of a whole study all tables together are too large for a small machine.
-        self.table = lru_cache(40)(self._read)
-        self.experiments = lru_cache(8)(self._experiments)
-        self.deflections = lru_cache(8)(self._deflections)
-        self.arm = lru_cache(None)(
-            lambda robot: Arm(robots[robot], tool_m=read["tool_offset_m"])
-        )
+        self.wrench_at = str(configuration["interpretations"]["wrench_at"])
+        # Bound the caches, because all tables of a whole study do not fit into the
+        # memory of a small machine.
+        self.table = lru_cache(40)(self._read_table)
+        self.experiments = lru_cache(8)(self._read_experiments)
+        self.deflections = lru_cache(8)(self._read_deflections)
+        self.arm = lru_cache(None)(self._build_arm)
 
     def at(self, point: str) -> tuple[str, ...]:
-        """What the wrench acts on (interpretation R6) where a point is looked at: where
-        none is named, the last one."""
+        """Name the target on which the wrench acts (interpretation R6) when a point is
+        observed; none stands for the last one."""
         return () if self.wrench_at == "end_effector" else (point,)
 
     def pick(self, file: str, count: int) -> np.ndarray:
-        """Some of so many rows, in order, drawn by the seed and the file's name."""
+        """Draw a sample of `count` rows, in order, by the seed and the file's name."""
         generator = np.random.default_rng([self.seed, zlib.crc32(file.encode())])
         return np.sort(generator.choice(count, min(count, self.sample), replace=False))
 
     def document(self, file: str) -> Any:
-        """A JSON file."""
+        """Read a JSON file."""
         return json.loads((self.folder / file).read_text("utf-8"))
 
     def has(self, file: str) -> bool:
-        """Whether the run has made a file."""
+        """Whether the run has written a file."""
         return (self.folder / file).is_file()
 
-    def _read(self, file: str) -> pd.DataFrame:
-        """A Parquet or CSV file; `table` is the same, read once."""
-        path = self.folder / file
-        return (
-            pq.ParquetFile(path).read().to_pandas()
-            if file.endswith(".parquet")
-            else pd.read_csv(path)
-        )
+    def _build_arm(self, robot: str) -> Arm:
+        """Build the arm of a robot file, with the configured target offset."""
+        tool_m = self.configuration["interpretations"]["tool_offset_m"]
+        return Arm(self.robots[robot], tool_m=tool_m)
 
-    def _experiments(
-        self, robot: str, test: bool = False
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Joint angles (sets, configurations, n) and wrenches (sets, configurations, 6)
-        as the file has them."""
-        frame = self.table(
-            f"data/simulated/{robot}{'/test' * test}/experiments.parquet"
-        )
+    def _read_table(self, file: str) -> pd.DataFrame:
+        """Read a Parquet or CSV file."""
+        path = self.folder / file
+        if file.endswith(".parquet"):
+            return pq.ParquetFile(path).read().to_pandas()
+        return pd.read_csv(path)
+
+    def _read_experiments(self, robot: str, use: str) -> tuple[np.ndarray, np.ndarray]:
+        """Read joint angles (sets, configurations, n) and wrenches (sets,
+        configurations, 6) for a use, "identification" or "test"."""
+        subfolder = "/test" if use == "test" else ""
+        frame = self.table(f"data/simulated/{robot}{subfolder}/experiments.parquet")
         sets = frame["data_set"].nunique()
         joints = self.arm(robot).joints
-        angles = (
-            frame[[f"q{j}" for j in range(1, joints + 1)]]
-            .to_numpy()
-            .reshape(sets, -1, joints)
-        )
-        return angles, frame[list(WRENCH)].to_numpy().reshape(sets, -1, 6)
+        angles = frame[[f"q{j}" for j in range(1, joints + 1)]].to_numpy()
+        wrenches = frame[list(WRENCH)].to_numpy()
+        return angles.reshape(sets, -1, joints), wrenches.reshape(sets, -1, 6)
 
-    def _deflections(self, file: str, point: str) -> np.ndarray:
-        """Deflections (sets, configurations, 6) of a measuring point as a file has
-        them."""
+    def _read_deflections(self, file: str, point: str) -> np.ndarray:
+        """Read the deflections (sets, configurations, 6) of a measuring point."""
         rows = self.table(file).query("point == @point")
-        return (
-            rows[list(COMPONENTS)].to_numpy().reshape(rows["data_set"].nunique(), -1, 6)
-        )
+        sets = rows["data_set"].nunique()
+        return rows[list(COMPONENTS)].to_numpy().reshape(sets, -1, 6)
 
 
 def open_philox_stream(
     seed: int, robot: str, purpose: str, data_set: int = 0
 ) -> np.random.Generator:
-    """The stream of random numbers of one purpose in one data set; `robot` is the name
-    of its file.
+    """Open the stream of random numbers of one purpose in one data set.
 
     A Philox counter generator: its key is the first 16 bytes of the SHA-256 of
-    ``seed/robot``, the third word of its counter the data set, the fourth the first 8
-    bytes of the SHA-256 of what the numbers are for.
+    ``seed/robot``, the third word of its counter the data set, and the fourth the first
+    8 bytes of the SHA-256 of the purpose.
+
+    Parameters
+    ----------
+    seed : seed of the run
+    robot : name of the robot's file
+    purpose : purpose of the numbers
+    data_set : number of the data set
     """
-    key = hashlib.sha256(f"{seed}/{robot}".encode()).digest()
-    words = [int.from_bytes(key[start : start + 8], "little") for start in (0, 8)]
+    digest = hashlib.sha256(f"{seed}/{robot}".encode()).digest()
+    key = np.frombuffer(digest[:16], "<u8")
     use = int.from_bytes(hashlib.sha256(purpose.encode()).digest()[:8], "little")
-    return np.random.Generator(
-        np.random.Philox(key=np.array(words, np.uint64), counter=[0, 0, data_set, use])
-    )
-
-
-# Two programs that do the same in double precision, in another order.
-ROUNDING = 1e-9
+    return np.random.Generator(np.random.Philox(key=key, counter=[0, 0, data_set, use]))
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One check of one file, by an independent path.
+    """One check of one file by an independent path.
 
-    `compared`: how many values. `worst`: largest difference over what is allowed; a
-    check holds up to 1. `note`: where it does not hold: what was found and what was
-    expected.
+    Attributes
+    ----------
+    checked : property of the file
+    by : independent path
+    compared : number of values
+    worst : largest difference over its tolerance; a check holds up to 1
+    note : found and expected value, if the check does not hold
+    file : path of the file
     """
 
     checked: str
@@ -150,7 +161,7 @@ class Finding:
 
     @property
     def holds(self) -> bool:
-        """Whether no value is further off than allowed."""
+        """Whether all differences are within their tolerance."""
         return bool(self.worst <= 1.0)
 
 
@@ -162,47 +173,49 @@ def compare(
     relative: float = ROUNDING,
     absolute: float = 0.0,
 ) -> Finding:
-    """Values of a file beside those of an independent path; allowed: `relative` to the
-    largest expected one, and `absolute`."""
-    left, right = (np.asarray(each, float).ravel() for each in (found, expected))
-    if left.shape != right.shape:
-        return Finding(
-            checked,
-            by,
-            len(right),
-            np.inf,
-            f"found {len(left)} values, expected {len(right)}",
-        )
-    if not len(left):
+    """Compare values of a file with those of an independent path.
+
+    Parameters
+    ----------
+    checked, by : as in `Finding`
+    found, expected : arrays of equal size, of the file and of the independent path
+    relative : tolerance relative to the largest expected value
+    absolute : tolerance to add to it
+    """
+    actual = np.asarray(found, float).ravel()
+    desired = np.asarray(expected, float).ravel()
+    count = len(desired)
+    if len(actual) != count:
+        note = f"found {len(actual)} values, expected {count}"
+        return Finding(checked, by, count, np.inf, note)
+    if not count:
         return Finding(checked, by, 0, 0.0)
-    same = (left == right) | (np.isnan(left) & np.isnan(right))
-    allowed = absolute + relative * np.max(
-        np.abs(right[np.isfinite(right)]), initial=0.0
-    )
+    equal = (actual == desired) | (np.isnan(actual) & np.isnan(desired))
+    scale = np.max(np.abs(desired[np.isfinite(desired)]), initial=0.0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        off = np.where(same, 0.0, np.abs(left - right) / allowed)
-    # Not a number beside a number, or a difference where none is allowed.
-    off = np.where(np.isnan(off), np.inf, off)
-    place = int(np.argmax(off))
-    note = (
-        ""
-        if off[place] <= 1
-        else f"value {place}: found {left[place]:.9g}, expected {right[place]:.9g}"
-    )
-    return Finding(checked, by, len(left), float(off[place]), note)
+        ratio = np.abs(actual - desired) / (absolute + relative * scale)
+    ratio[equal] = 0.0
+    # Only one value is not a number, or both differ without any tolerance.
+    ratio[np.isnan(ratio)] = np.inf
+    index = int(np.argmax(ratio))
+    worst = float(ratio[index])
+    note = f"value {index}: found {actual[index]:.9g}, expected {desired[index]:.9g}"
+    return Finding(checked, by, count, worst, note if worst > 1 else "")
 
 
 def require(
     checked: str, by: str, holds: Any, note: str = "", count: int = 1
 ) -> Finding:
-    """A statement about so many values that holds or does not; the note is for where it
+    """State whether a condition on `count` values holds; the note is used only if it
     does not."""
-    return Finding(checked, by, count, 0.0 if holds else np.inf, "" if holds else note)
+    if holds:
+        return Finding(checked, by, count, 0.0)
+    return Finding(checked, by, count, np.inf, note)
 
 
 def require_each_once(frame: pd.DataFrame, **ranges: Iterable[int]) -> Finding:
-    """Whether rows are numbered by all combinations of ranges, the last one changing
-    fastest."""
+    """Require rows for all combinations of the ranges of some columns, with the last
+    column changing fastest."""
     expected = pd.MultiIndex.from_product([*ranges.values()]).to_frame()
     checked = f"each {' and '.join(ranges).replace('_', ' ')} once"
     return compare(checked, "counting", frame[list(ranges)], expected, 0.0)

@@ -1,5 +1,5 @@
-"""The study's data and estimates: random numbers by numpy's Philox, deflections by
-pinocchio, least squares by numpy."""
+"""Audit of the study's data and estimates: random numbers by numpy's Philox generator,
+deflections by pinocchio, least squares by numpy."""
 
 from __future__ import annotations
 
@@ -18,62 +18,65 @@ from elastocal_proof.audit.finished_run import (
     require_each_once,
 )
 
-# Deflections are differences of positions of metres; so much is lost of their digits
-# (m, rad).
-_DIGITS = 1e-14
-# Beyond this a design counts as one that does not determine the compliances (equation
+# Absolute tolerance of deflections, m and rad: they are differences of positions of
+# some metres, and lose their digits.
+_DEFLECTION_TOLERANCE = 1e-14
+# A design with a larger condition number does not determine the compliances (equation
 # 11 in double precision).
 _LARGEST_CONDITION = 1e7
-# Least squares lose digits by the condition number times those of a double (2e-16),
-# here up to this condition number.
-_EXACT_UP_TO = 1e4
+# Up to this condition number the rounding error of least squares, which is the
+# condition number times that of a double (2e-16), is below `ROUNDING`.
+_WELL_CONDITIONED = 1e4
 _STREAM = "numpy's Philox stream"
 
 
 def check_experiments(run: FinishedRun, file: str, robot: str) -> Iterator[Finding]:
     """Joint angles and wrenches of sampled data sets from their random streams."""
     settings = run.configuration
-    read = run.configuration["interpretations"]
-    arm = run.arm(robot)
     use = "identification"
     sets = settings["data_sets"]
     count = settings["configurations"]
     if "/test/" in file:
+        use = "test"
         sets = 1
         count = settings["test_configurations"]
-        use = "test"
-    numbered = require_each_once(
+    numbering = require_each_once(
         run.table(file), data_set=range(sets), configuration=range(count)
     )
-    yield numbered
-    low = np.full(arm.joints, -np.pi)
-    high = np.full(arm.joints, np.pi)
-    if read["joint_range"] == "limits":
-        low, high = np.deg2rad(run.robots[robot]["joint_limits_deg"]).T
-    for data_set in run.pick(file, sets) if numbered.holds else ():
-        turns = open_philox_stream(
-            run.seed, robot, f"{use}/joint angles", data_set
-        ).random((count, arm.joints))
-        normal = open_philox_stream(
-            run.seed, robot, f"{use}/force", data_set
-        ).standard_normal((count, 3))
-        angles = low + (high - low) * turns
-        force = settings["loading"]["force_N"] * normal
-        force /= np.linalg.norm(normal, axis=1)[:, None]
-        lever = np.tile(np.array(settings["loading"]["offset_m"], float), (count, 1))
-        if read["offset_frame"] == "tool":
-            turned = [arm.pose(arm.extend(q), arm.points[-1])[1] for q in angles]
-            lever = np.einsum("kij,kj->ki", turned, lever)
-        wrenches = np.concatenate([force, np.cross(lever, force)], axis=1)
-        for name, found, expected in zip(
-            ("joint angles", "wrenches"),
-            run.experiments(robot, use == "test"),
-            (angles, wrenches),
-            strict=True,
+    yield numbering
+    if not numbering.holds:
+        return
+    stored = run.experiments(robot, use)
+    for data_set in run.pick(file, sets):
+        drawn = _draw_experiments(run, robot, use, int(data_set), count)
+        for name, values, expected in zip(
+            ("joint angles", "wrenches"), stored, drawn, strict=True
         ):
-            yield compare(
-                f"{name}, data set {data_set}", _STREAM, found[data_set], expected
-            )
+            checked = f"{name}, data set {data_set}"
+            yield compare(checked, _STREAM, values[data_set], expected)
+
+
+def _draw_experiments(
+    run: FinishedRun, robot: str, use: str, data_set: int, count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Draw joint angles (count, n) and wrenches (count, 6) of a data set; `use` is
+    "identification" or "test"."""
+    settings = run.configuration
+    arm = run.arm(robot)
+    low, high = -np.pi, np.pi
+    if settings["interpretations"]["joint_range"] == "limits":
+        low, high = np.deg2rad(run.robots[robot]["joint_limits_deg"]).T
+    stream = open_philox_stream(run.seed, robot, f"{use}/joint angles", data_set)
+    angles = low + (high - low) * stream.random((count, arm.joints))
+    stream = open_philox_stream(run.seed, robot, f"{use}/force", data_set)
+    force = stream.standard_normal((count, 3))
+    force /= np.linalg.norm(force, axis=1)[:, None]
+    force *= settings["loading"]["force_N"]
+    lever = np.array(settings["loading"]["offset_m"], float)
+    if settings["interpretations"]["offset_frame"] == "tool":
+        end = arm.points[-1]
+        lever = np.array([arm.pose(arm.extend(q), end)[1] @ lever for q in angles])
+    return angles, np.concatenate([force, np.cross(lever, force)], axis=1)
 
 
 def check_ideal_deflections(
@@ -81,39 +84,38 @@ def check_ideal_deflections(
 ) -> Iterator[Finding]:
     """Deflections of sampled rows by pinocchio's exact kinematics, tubes by
     Castigliano's theorem."""
-    arm, (angles, wrench) = run.arm(robot), run.experiments(robot, "/test/" in file)
+    arm = run.arm(robot)
+    angles, wrenches = run.experiments(
+        robot, "test" if "/test/" in file else "identification"
+    )
     sets, count = angles.shape[:2]
     for point in arm.points:
-        there = run.deflections(file, point)
+        deflections = run.deflections(file, point)
         yield compare(
             f"data sets and configurations of {point}",
             "counting",
-            there.shape,
+            deflections.shape,
             (sets, count, 6),
             0.0,
         )
-        rows = [
-            divmod(int(row), count) for row in run.pick(f"{file} {point}", sets * count)
-        ]
-        exact = []
+        rows = run.pick(f"{file} {point}", sets * count)
+        expected = []
         for row in rows:
-            position_0, rotation_0 = arm.pose(arm.extend(angles[row]), point)
-            coordinates, _ = arm.loaded(
-                arm.springs, angles[row], wrench[row], 1, *run.at(point)
+            index = divmod(int(row), count)
+            position_0, rotation_0 = arm.pose(arm.extend(angles[index]), point)
+            coordinates, _ = arm.deflect(
+                arm.springs, angles[index], wrenches[index], 1, *run.at(point)
             )
             position, rotation = arm.pose(coordinates, point)
-            exact.append(
-                np.concatenate(
-                    [position - position_0, pin.log3(rotation @ rotation_0.T)]
-                )
+            expected.append(
+                [*(position - position_0), *pin.log3(rotation @ rotation_0.T)]
             )
-        stored = np.array([there[row] for row in rows])
         yield compare(
             f"deflection of {point}, {len(rows)} rows",
             "pinocchio",
-            stored,
-            exact,
-            absolute=_DIGITS,
+            deflections.reshape(-1, 6)[rows],
+            expected,
+            absolute=_DEFLECTION_TOLERANCE,
         )
 
 
@@ -123,27 +125,23 @@ def check_measured_deflections(
     """Measured deflections of sampled data sets: the ideal ones and noise from its
     stream."""
     for point in run.arm(robot).points:
-        clean, noisy = (
-            run.deflections(name, point)
-            for name in (f"data/simulated/{robot}/ideal.parquet", file)
-        )
+        ideal = run.deflections(f"data/simulated/{robot}/ideal.parquet", point)
+        measured = run.deflections(file, point)
         yield compare(
             f"data sets and configurations of {point}",
             "counting",
-            noisy.shape,
-            clean.shape,
+            measured.shape,
+            ideal.shape,
             0.0,
         )
-        for data_set in run.pick(f"{file} {point}", len(clean)):
-            drawn = open_philox_stream(
-                run.seed, robot, f"noise/{point}", data_set
-            ).standard_normal(clean.shape[1:])
-            expected = clean[data_set] + 1e-6 * float(noise_um) * drawn
+        for data_set in run.pick(f"{file} {point}", len(ideal)):
+            stream = open_philox_stream(run.seed, robot, f"noise/{point}", data_set)
+            noise = 1e-6 * float(noise_um) * stream.standard_normal(ideal.shape[1:])
             yield compare(
                 f"measured deflection of {point}, data set {data_set}",
                 _STREAM,
-                noisy[data_set],
-                expected,
+                measured[data_set],
+                ideal[data_set] + noise,
             )
 
 
@@ -152,28 +150,33 @@ def solve_staged(
     regressors: Mapping[str, np.ndarray],
     joints: int,
 ) -> tuple[np.ndarray, float]:
-    """What each measurement adds to the compliances, (joints, rows), and the worst
-    condition number, by pseudo-inverses.
+    """Solve the stages of a strategy by pseudo-inverses.
 
-    `regressors` (rows, joints): of each measuring point; measurements are in their
-    order.
+    Parameters
+    ----------
+    stages : stages of the strategy, with joints and measuring points
+    regressors : (rows, joints) arrays, of each measuring point
+    joints : number of joints
+
+    Returns
+    -------
+    gain : (joints, rows of all points) array
+        Compliances are the gain times the measurements, in the order of `regressors`.
+    condition : largest condition number of a stage
     """
     ends = np.cumsum([0, *map(len, regressors.values())])
     units = dict(zip(regressors, np.split(np.eye(ends[-1]), ends[1:-1]), strict=True))
     gain = np.zeros((joints, ends[-1]))
     condition = 1.0
     for stage in stages:
-        identified, taken = (
-            np.array(stage.get(key, []), int) - 1 for key in ("joints", "held")
-        )
-        matrix, read = (
-            np.concatenate([each[name] for name in stage["points"]])
-            for each in (regressors, units)
-        )
-        gain[identified] = np.linalg.pinv(matrix[:, identified]) @ (
-            read - matrix[:, taken] @ gain[taken]
-        )
-        condition = max(condition, float(np.linalg.cond(matrix[:, identified])))
+        identified = np.array(stage["joints"], int) - 1
+        held = np.array(stage.get("held", []), int) - 1
+        matrix = np.concatenate([regressors[name] for name in stage["points"]])
+        measurements = np.concatenate([units[name] for name in stage["points"]])
+        columns = matrix[:, identified]
+        corrected = measurements - matrix[:, held] @ gain[held]
+        gain[identified] = np.linalg.pinv(columns) @ corrected
+        condition = max(condition, float(np.linalg.cond(columns)))
     return gain, condition
 
 
@@ -184,51 +187,62 @@ def check_estimates(
     determine them has none."""
     frame = run.table(file)
     settings = run.configuration
-    arm = run.arm(robot)
+    yield require_each_once(
+        frame,
+        data_set=range(settings["data_sets"]),
+        length=range(1, settings["configurations"] + 1),
+    )
     stages = run.strategies[strategy]["stages"]
-    numbered = {
-        "data_set": range(settings["data_sets"]),
-        "length": range(1, settings["configurations"] + 1),
-    }
-    yield require_each_once(frame, **numbered)
-    rows = 6 if settings["interpretations"]["measured"] == "pose" else 3
-    points = dict.fromkeys(name for stage in stages for name in stage["points"])
-    for row in (frame.iloc[place] for place in run.pick(file, len(frame))):
+    measured = f"data/simulated/{robot}/{noise_um}um/measured.parquet"
+    for number in run.pick(file, len(frame)):
+        row = frame.iloc[number]
         data_set = int(row["data_set"])
         length = int(row["length"])
-        loads = [each[data_set, :length] for each in run.experiments(robot)]
-        matrices = {
-            name: np.concatenate(
-                [
-                    arm.regressor(*load, name, *run.at(name))[:rows]
-                    for load in zip(*loads, strict=True)
-                ]
-            )
-            for name in points
-        }
-        gain, condition = solve_staged(stages, matrices, arm.joints)
-        enough = all(
-            rows * length * len(stage["points"]) >= len(stage["joints"])
-            for stage in stages
-        )
-        lost = 1.0 if enough and condition < _LARGEST_CONDITION else np.nan
-        noisy = f"data/simulated/{robot}/{noise_um}um/measured.parquet"
-        seen = np.concatenate(
-            [
-                run.deflections(noisy, name)[data_set, :length, :rows].ravel()
-                for name in points
-            ]
-        )
-        words = f"of data set {data_set}, length {length}"
-        allowed = ROUNDING * max(1.0, condition / _EXACT_UP_TO)
-        given = row.filter(regex=r"^compliance_\d+$")
+        expected, condition = _estimate(run, robot, stages, measured, data_set, length)
         yield compare(
-            f"compliances {words}",
+            f"compliances of data set {data_set}, length {length}",
             "numpy on pinocchio",
-            given,
-            lost * gain @ seen,
-            allowed,
+            row.filter(regex=r"^compliance_\d+$"),
+            expected,
+            ROUNDING * max(1.0, condition / _WELL_CONDITIONED),
         )
+
+
+def _estimate(
+    run: FinishedRun,
+    robot: str,
+    stages: Sequence[Mapping[str, Any]],
+    measured: str,
+    data_set: int,
+    length: int,
+) -> tuple[np.ndarray, float]:
+    """Estimate the compliances (n,) of a data set from its first configurations.
+
+    They are not a number if the measurements do not determine them. Also returns the
+    condition number.
+    """
+    arm = run.arm(robot)
+    angles, wrenches = run.experiments(robot, "identification")
+    components = 6 if run.configuration["interpretations"]["measured"] == "pose" else 3
+    regressors = {}
+    deflections = []
+    for name in dict.fromkeys(name for stage in stages for name in stage["points"]):
+        matrices = [
+            arm.regressor(q, wrench, name, *run.at(name))[:components]
+            for q, wrench in zip(
+                angles[data_set, :length], wrenches[data_set, :length], strict=True
+            )
+        ]
+        regressors[name] = np.concatenate(matrices)
+        deflection = run.deflections(measured, name)[data_set, :length, :components]
+        deflections.append(deflection.ravel())
+    gain, condition = solve_staged(stages, regressors, arm.joints)
+    compliances = gain @ np.concatenate(deflections)
+    determined = condition < _LARGEST_CONDITION and all(
+        components * length * len(stage["points"]) >= len(stage["joints"])
+        for stage in stages
+    )
+    return compliances if determined else np.nan * compliances, condition
 
 
 CHECKS = {
