@@ -1,4 +1,5 @@
-"""Fixtures: the robots and strategies of the repository's own config."""
+"""Fixtures of all tests: robots, strategies and the configuration of the repository, and
+checkouts with a diagnosed campaign."""
 
 import os
 import shutil
@@ -12,15 +13,15 @@ from elastocal.io.documents import check_document, read_document
 from elastocal.mechanics.robot_file import parse_robot
 from elastocal.study.strategies import strategy_from_document
 
-# An environment may forbid programs to keep what they compile; half of a run of the
-# tests would be compiling.
+# An environment may forbid Python to write compiled modules. Compiling them again would
+# take half of a test run.
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
 
-# The same examples in every run: a test that fails must fail again. A machine that is
-# too slow to draw them is no fault.
+# Every run draws the same examples, so that a failing test fails again. A slow machine
+# is no fault.
 hypothesis.settings.register_profile(
     "repeatable",
     deadline=None,
@@ -46,31 +47,27 @@ def pytest_addoption(parser):
 
 
 def pytest_collection_modifyitems(config, items):
-    """Files of minutes first, so that no worker is left alone with one at the end; slow
-    tests where they are asked for.
+    """Deselect slow tests unless they are asked for, and run the files that take minutes
+    first, so that no worker has one left at the end.
 
-    A file's tests, which share what they make, stay together: each tenth has every
-    tenth of the slow files.
+    The tests of a file stay together because they share fixtures: a tenth of the slow
+    tests is every tenth slow file.
     """
     slow = sorted({item.path for item in items if item.get_closest_marker("slow")})
-    asked = config.getoption("slow")
-    part = int(config.getoption("part")[:8], 16) % 10
-    chosen = {"none": [], "all": slow, "part": slow[part::10]}[asked]
-    left_out = [
-        item
-        for item in items
-        if item.path not in chosen and item.get_closest_marker("slow")
-    ]
-    config.hook.pytest_deselected(items=left_out)
-    kept = [
-        item
-        for item in items
-        if item.path in chosen or not item.get_closest_marker("slow")
-    ]
+    tenth = int(config.getoption("part")[:8], 16) % 10
+    selections = {"none": [], "all": slow, "part": slow[tenth::10]}
+    chosen = selections[config.getoption("slow")]
+    deselected = []
+    kept = []
+    for item in items:
+        is_skipped = item.path not in chosen and item.get_closest_marker("slow")
+        (deselected if is_skipped else kept).append(item)
+    config.hook.pytest_deselected(items=deselected)
     items[:] = sorted(kept, key=lambda item: item.path.parent.name != "workflow")
 
 
 def load_robot(key):
+    """Read a robot of the repository by the name of its file."""
     path = CONFIG / "robots" / f"{key}.yaml"
     document = read_document(path)
     check_document(document, "robot", path)
@@ -106,24 +103,24 @@ def robot(request):
 @pytest.fixture(scope="session")
 def strategies():
     """The paper's eight strategies by the names of their files."""
-    found = {}
+    strategies = {}
     for path in sorted((CONFIG / "strategies").glob("*.yaml")):
         document = read_document(path)
         check_document(document, "strategy", path)
-        found[path.stem] = strategy_from_document(document)
-    return found
+        strategies[path.stem] = strategy_from_document(document)
+    return strategies
 
 
 @pytest.fixture(scope="session")
 def config(config_folder):
-    """The repository's own configuration."""
+    """The configuration of the repository."""
     return read_document(config_folder.parent / "config.yaml")
 
 
 @pytest.fixture(scope="session")
 def made_checkout(tmp_path_factory):
-    """A checkout with the diagnosed campaign ``made`` in it, to be read."""
-    # Imports the whole loop, which few tests need.
+    """A checkout with the diagnosed campaign ``made``, which no test may change."""
+    # This module imports the whole loop, which only few tests need.
     from certified import certified_checkout
 
     top = tmp_path_factory.mktemp("made")
@@ -133,7 +130,7 @@ def made_checkout(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def checkout(made_checkout, tmp_path_factory):
-    """A copy, to be changed by the tests of a file."""
+    """A copy of the checkout that the tests of a file may change."""
     return shutil.copytree(
         made_checkout, tmp_path_factory.mktemp("checkout") / "top", symlinks=True
     )
@@ -141,8 +138,8 @@ def checkout(made_checkout, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def regressed_checkout(tmp_path_factory):
-    """A checkout with the diagnosed campaign ``smooth`` in it, of a robot that errs by
-    what only a regression has."""
+    """A checkout with the diagnosed campaign ``smooth`` of a robot whose errors only a
+    regression can describe."""
     from certified import certified_checkout
     from made_remainders import smoothly_wrong_folder
 

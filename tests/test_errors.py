@@ -1,4 +1,4 @@
-"""The error of bad input: one line, with the place, what stands there and what may."""
+"""The error of bad input is one line: where, what was found and what is allowed."""
 
 import errno
 from pathlib import Path
@@ -28,9 +28,7 @@ from elastocal.errors import (
         ),
     ],
 )
-def test_the_message_is_one_line_of_place_what_was_found_and_what_is_allowed_and_keeps_its_parts(
-    parts, message
-):
+def test_the_message_is_one_line_and_the_error_keeps_its_parts(parts, message):
     error = InputError(*parts)
     assert str(error) == message
     assert (error.source, error.key, error.found, error.allowed) == (
@@ -39,22 +37,24 @@ def test_the_message_is_one_line_of_place_what_was_found_and_what_is_allowed_and
     )
 
 
-def test_the_closest_of_the_names_that_are_allowed_comes_first_whatever_its_case():
+def test_the_closest_allowed_name_comes_first_regardless_of_its_case():
     assert suggest_names("KUKE", ["abb", "kuka"]) == "'kuka'? (abb, kuka)"
     assert suggest_names("joint", ["abb", "kuka"]) == "abb, kuka"
 
 
-@pytest.mark.parametrize("part", range(4))
-def test_the_message_stays_short_whatever_stands_in_it(part):
+@pytest.mark.parametrize("long_index", range(4))
+def test_the_message_stays_short_if_one_of_its_parts_is_very_long(long_index):
     parts = ["a.csv", "q1", "one", "two"]
-    parts[part] = "x" * 5_000_000
+    parts[long_index] = "x" * 5_000_000
     message = str(InputError(*parts))
-    assert len(message) <= LONGEST_MESSAGE and "…" in message
-    assert all(word in message for number, word in enumerate(parts) if number != part)
+    assert len(message) <= LONGEST_MESSAGE
+    assert "…" in message
+    for index, text in enumerate(parts):
+        assert index == long_index or text in message
     assert len(str(InputError(*["x" * 1000] * 4))) == LONGEST_MESSAGE
 
 
-def test_what_would_steer_a_terminal_is_escaped():
+def test_characters_that_would_control_a_terminal_are_escaped():
     message = str(InputError("a\x1b.yaml", "\ud800", "\x1b[2Jµ", "\x07"))
     assert (
         message
@@ -67,7 +67,7 @@ def test_what_would_steer_a_terminal_is_escaped():
     ("text", "character"),
     [("a\x1bb", "\x1b"), ("a\u202eb", "\u202e"), ("a\nb", "\n"), ("KR\u00a0270 é", "")],
 )
-def test_the_first_character_that_would_steer_is_found(text, character):
+def test_the_first_control_character_is_found_and_escaped(text, character):
     assert find_control_character(text) == character
     assert escape_control_characters(text) == (
         text.replace(character, ascii(character)[1:-1]) if character else text
@@ -75,11 +75,12 @@ def test_the_first_character_that_would_steer_is_found(text, character):
 
 
 @pytest.mark.parametrize(
-    ("error", "words"),
+    ("error", "phrase"),
     [
         (
             OSError(errno.ENOSPC, "No space left on device", "a"),
-            "a: found No space left on device; allowed: a file or folder that is there, on a disk with space",
+            "a: found No space left on device; allowed: a file or folder that is there,"
+            " on a disk with space",
         ),
         (
             MemoryError(),
@@ -98,5 +99,5 @@ def test_the_first_character_that_would_steer_is_found(text, character):
         ),
     ],
 )
-def test_a_fault_of_the_machine_is_one_line_with_what_would_help(error, words):
-    assert words in str(describe_system_fault(error, "here"))
+def test_a_fault_of_the_machine_is_one_line_with_a_remedy(error, phrase):
+    assert phrase in str(describe_system_fault(error, "here"))

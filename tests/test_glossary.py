@@ -1,5 +1,5 @@
-"""Code, messages, reports and pages use the words of the field; a word of the private
-dialect of earlier versions fails."""
+"""Code, messages, reports and pages use the words of the field, and none of the private
+words of earlier versions."""
 
 import re
 from pathlib import Path
@@ -19,9 +19,11 @@ SEARCHED = (
     *("config", "docs", "workflow", "src", "benchmarks"),
 )
 KINDS = {".py", ".smk", ".typ", ".txt", ".yaml", ".md", ""}
-# Each banned word with what is said instead.
+# Patterns of banned words, each with the words to use instead.
 GLOSSARY = {
-    r"rivals?|weigh(s|ed|ing)? (the )?alternatives": "alternative, compare alternatives",
+    r"rivals?|weigh(s|ed|ing)? (the )?alternatives": (
+        "alternative, compare alternatives"
+    ),
     r"doubts?|akin": "model departure, a related mechanism",
     r"cannot tell|told from|tell it from": "non-identifiable, distinguishable from, ambiguous",
     r"off the model": "residual subspace, contribution",
@@ -30,29 +32,40 @@ GLOSSARY = {
     r"circumstances?": "conditions",
     r"explainable|foreseen": "predictable share, promised",
     r"state_verdict": "verdict, report",
-    r"readings?_(of|from)|Readings|readings": "interpretation of the paper; measurement of a tracker",
+    r"readings?_(of|from)|Readings|readings": (
+        "interpretation of the paper; measurement of a tracker"
+    ),
     r"appearing_whole|whole files": "atomic write",
     r"intake|taken_in": "load, import",
     r"test poses": "validation poses, held-out poses",
-    r"opened_\w+|\w*_opened|loop\.opened|blind\.truths": "load_..., the name of what the file holds",
-    r"(tells?|telling|told) .{0,40}apart": "distinguish",
-    r"(data|could not|cannot|nobody|experiments of .{0,25}) (can )?tells?": "identify, identifiable",
-    r"be told|unless told|(is|are|was|nobody) (not )?told": "identified, by default, declared, given",
-    r"what (is|was|were) said|said (for|of) what|name (is )?said|said (alone|then)|worth what they say": (
-        "verdict, reported, stated, calibrated"
+    r"opened_\w+|\w*_opened|loop\.opened|blind\.truths": (
+        "load_..., the name of what the file holds"
     ),
-    # Rows and columns that the pipeline writes keep their names: hypotheses that hold
-    # the truth, class with the truth.
-    r"(?<!hypotheses that )holds? the truth|(of|by|given|give|above|below|and|where) (the|its|their) truths?": "ground truth",
+    r"(tells?|telling|told) .{0,40}apart": "distinguish",
+    r"(data|could not|cannot|nobody|experiments of .{0,25}) (can )?tells?": (
+        "identify, identifiable"
+    ),
+    r"be told|unless told|(is|are|was|nobody) (not )?told": (
+        "identified, by default, declared, given"
+    ),
+    r"what (is|was|were) said|said (for|of) what|name (is )?said|said (alone|then)"
+    r"|worth what they say": ("verdict, reported, stated, calibrated"),
+    # Names of rows and columns that the pipeline writes are allowed: hypotheses that
+    # hold the truth, class with the truth.
+    r"(?<!hypotheses that )holds? the truth"
+    r"|(of|by|given|give|above|below|and|where) (the|its|their) truths?": "ground truth",
     r"(a|every|sealed) truth|truth document": "ground truth; the true value, where it is a number",
 }
-# Names of variables and functions.
-IDENTIFIERS = r"\w*_(said|told)\w*|(said|told|unsaid|saying) \|?= .*|(said|told|unsaid|saying)([\[(]|\.\w|: \w+\[).*"
+# Banned names of variables and functions.
+IDENTIFIERS = (
+    r"\w*_(said|told)\w*|(said|told|unsaid|saying) \|?= .*"
+    r"|(said|told|unsaid|saying)([\[(]|\.\w|: \w+\[).*"
+)
 
 
 @pytest.fixture(scope="module")
 def texts():
-    """Each file's text by its name."""
+    """Texts of all files by their paths."""
     paths = [
         path
         for name in SEARCHED
@@ -65,9 +78,9 @@ def texts():
     }
 
 
-def found(pattern, texts):
-    """Lines in which it stands; the name of a random stream cannot change without
-    changing its numbers."""
+def find_lines(pattern, texts):
+    """Return the lines that match a pattern. Names of random streams are allowed, because
+    a new name would change the random numbers."""
     pattern = re.compile(rf"(?<![A-Za-z])(?:{pattern})(?![A-Za-z])")
     lines = [
         (path, line)
@@ -83,11 +96,11 @@ def found(pattern, texts):
 
 
 @pytest.mark.parametrize("banned", GLOSSARY)
-def test_no_word_of_the_private_dialect_comes_back(banned, texts):
-    assert found(banned, texts) == [], f"say {GLOSSARY[banned]!r}"
+def test_no_banned_word_is_used(banned, texts):
+    assert find_lines(banned, texts) == [], f"say {GLOSSARY[banned]!r}"
 
 
-def test_no_variable_is_named_after_the_act_of_saying(texts):
-    assert found(IDENTIFIERS, texts) == [], (
+def test_no_variable_is_called_said_or_told(texts):
+    assert find_lines(IDENTIFIERS, texts) == [], (
         "say what it is, such as 'verdict', 'stated', 'outcome', 'declared'"
     )

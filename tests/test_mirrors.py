@@ -1,5 +1,5 @@
-"""Where the tests of a module are: every module of both packages has a file of its
-name, in the folder of its room."""
+"""Every module of both packages has a test file of its name, in the folder of its
+package."""
 
 from pathlib import Path
 
@@ -9,14 +9,15 @@ from elastocal.effects import catalogue
 
 TESTS = Path(__file__).resolve().parent
 SOURCES = [TESTS.parent / "src" / name for name in ("elastocal", "elastocal_proof")]
-# Tests of the catalogue and of closed forms go through all of them.
+# The tests of the catalogue and of closed forms cover all effects.
 EFFECTS = {
     f"effects/{effect.listed.__module__.rpartition('.')[2]}.py"
     for effect in catalogue.list_bundled_effects().values()
 }
 
 
-def modules():
+def list_modules():
+    """Return the paths of all modules within their packages."""
     return sorted(
         path.relative_to(top).as_posix()
         for top in SOURCES
@@ -26,19 +27,18 @@ def modules():
 
 
 @pytest.mark.parametrize(
-    "module", [module for module in modules() if module not in EFFECTS]
+    "module", [module for module in list_modules() if module not in EFFECTS]
 )
-def test_a_module_has_a_file_of_tests_of_its_name(module):
+def test_every_module_has_a_test_file_of_its_name(module):
     path = Path(module)
     mirror = TESTS / path.parent / f"test_{path.name}"
-    there = mirror.is_file() and "\ndef test_" in mirror.read_text(encoding="utf-8")
-    assert there, f"{module} has no tests in {mirror.relative_to(TESTS.parent)}"
+    has_tests = mirror.is_file() and "\ndef test_" in mirror.read_text(encoding="utf-8")
+    assert has_tests, f"{module} has no tests in {mirror.relative_to(TESTS.parent)}"
 
 
 @pytest.mark.parametrize(
-    "room", [path for top in SOURCES for path in top.rglob("__init__.py")], ids=str
+    "path", [path for top in SOURCES for path in top.rglob("__init__.py")], ids=str
 )
-def test_a_room_that_only_says_what_it_is_needs_no_tests(room):
-    """What an `__init__` would do is in no mirror."""
-    text = room.read_text(encoding="utf-8")
+def test_an_init_file_defines_nothing_because_it_has_no_test_file(path):
+    text = path.read_text(encoding="utf-8")
     assert "\ndef " not in text and "\nclass " not in text

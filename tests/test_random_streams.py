@@ -1,4 +1,4 @@
-"""Random numbers depend on what they are for and on nothing else."""
+"""Random numbers depend on the seed and on their purpose, and on nothing else."""
 
 import numpy as np
 import pytest
@@ -11,12 +11,13 @@ PINNED = [
 ]
 
 
-def numbers(*name, count=8):
+def draw_numbers(*name, count=8):
+    """Draw numbers from the stream of a name."""
     return open_stream(*name).random(count)
 
 
 @pytest.mark.parametrize(
-    "other",
+    "name",
     [
         (2, "kuka", "noise/6DoF", 3),
         (1, "fanuc", "noise/6DoF", 3),
@@ -27,12 +28,14 @@ def numbers(*name, count=8):
         (1, "kuka", "noise/6DoF", 3 + 2**32),
     ],
 )
-def test_another_seed_robot_purpose_or_data_set_gives_other_numbers(other):
-    assert not np.isin(numbers(1, "kuka", "noise/6DoF", 3), numbers(*other)).any()
+def test_another_seed_robot_purpose_or_data_set_gives_other_numbers(name):
+    assert not np.isin(
+        draw_numbers(1, "kuka", "noise/6DoF", 3), draw_numbers(*name)
+    ).any()
 
 
 def test_numbers_are_pinned():
-    # Published results rest on these streams; whoever changes them changes every table.
+    # Published results depend on these streams; another stream would change every table.
     assert (
         open_stream(1, "kuka", "identification/joint angles", 0)
         .bit_generator.random_raw(2)
@@ -45,8 +48,8 @@ def test_numbers_are_pinned():
     )
 
 
-def test_draws_are_those_of_streams_of_their_own_whatever_the_one_before_left_over():
-    # Three halves of a word leave a half for the next draw.
+def test_the_draws_of_a_data_set_do_not_depend_on_the_data_set_before():
+    # Three half words leave half a word in the generator.
     def halves(generator):
         return generator.integers(0, 2**32, 3, dtype=np.uint32)
 

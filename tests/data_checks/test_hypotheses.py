@@ -361,7 +361,7 @@ def test_what_is_simple_comes_first_and_no_each_is_there_twice(fanuc):
         "targets sit elsewhere",
     ]
     for each in single:
-        read = each.read(campaign)
+        read = each.apply(campaign)
         assert read is not campaign and len(read.measurements) <= len(
             campaign.measurements
         )

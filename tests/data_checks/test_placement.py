@@ -28,7 +28,7 @@ def exact(request, fanuc):
 def test_measurements_of_the_nominal_robot_lie_where_it_puts_them(exact, place):
     found = place(exact)
     np.testing.assert_allclose(found.distance, 0.0, atol=1e-8)
-    np.testing.assert_allclose(found.turn, 0.0, atol=1e-7)
+    np.testing.assert_allclose(found.rotation_angle, 0.0, atol=1e-7)
 
 
 def test_known_targets_are_predicted_by_pinocchio(fanuc):
@@ -51,7 +51,7 @@ def test_known_targets_are_predicted_by_pinocchio(fanuc):
             Rotation.from_rotvec(seen.rotation_vector[row])
             * Rotation.from_matrix(rotation).inv()
         )
-        assert found.turn[row] == pytest.approx(turn.magnitude(), abs=1e-9)
+        assert found.rotation_angle[row] == pytest.approx(turn.magnitude(), abs=1e-9)
         # In the base frame measured positions stay as they are.
         np.testing.assert_array_equal(found.measured[0][row], seen.position[row])
 

@@ -1,9 +1,10 @@
-"""Kills, and two runs at once: a plain `snakemake -j2` has to get over each.
+"""Fault injection: a plain `snakemake -j2` must recover from killed processes and from
+two runs at once.
 
-`make soak` runs it with forty kills. After each fault a plain run has to finish, and
-every file that the pipeline makes has to be, byte for byte, that of a run that nothing
-disturbed. No moment is a time, by which a fast machine may have ended: kills come when
-a run has made so many files, of as many as the undisturbed one made.
+`make soak` injects forty kills. After each fault a plain run must finish, and every file
+of the pipeline must be identical to that of an undisturbed run. A kill happens when a
+run has made a given number of files, up to the number of files of the undisturbed run. A
+given time would not do, because a fast machine could have finished by then.
 
 Usage: python tests/faults/soak.py [--kills 40] [--seed 1]
 """
@@ -28,9 +29,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "helpers"))
 from study_folder import SMALL, Study
 
 VICTIMS = ("job", "snakemake", "group")
-MADE = ("data", "results", "reports")
-# What a part of the study is made of; enough jobs after and beside one another, in some
-# seconds.
+OUTPUT_FOLDERS = ("data", "results", "reports")
+# Outputs that differ between runs: they contain times.
+VARYING = ("results/logs/", "results/timings/", "results/records/")
+# Configuration of the part of the study that is run: some seconds with enough jobs in
+# sequence and in parallel.
 CHANGES = SMALL | {
     "robots": ["kuka", "kuka_extended"],
     "noise_um": [0, 200],
@@ -45,8 +48,8 @@ TARGETS = """
 """
 
 
-def part_of_the_study(folder):
-    """Sources whose default target is a part of the study."""
+def make_study(folder):
+    """Copy the sources, with a part of the study as the default target."""
     study = Study.of_sources(folder)
     study.configure(CHANGES)
     study.replace(
@@ -57,91 +60,116 @@ def part_of_the_study(folder):
     return study
 
 
-def contents(study):
-    """Digest of each file that jobs write, but for logs and what says how long jobs
-    took."""
-    files = [p for name in MADE for p in study.path(name).rglob("*") if p.is_file()]
-    named = {p.relative_to(study.folder).as_posix(): p for p in files}
-    return {
-        name: hashlib.sha256(path.read_bytes()).hexdigest()
-        for name, path in named.items()
-        if not name.startswith(
-            ("results/logs/", "results/timings/", "results/records/")
-        )
-    }
+def digest_outputs(study):
+    """Return the digest of each file that jobs write, except for logs, timings and
+    records."""
+    digests = {}
+    for name in OUTPUT_FOLDERS:
+        for path in study.path(name).rglob("*"):
+            relative = path.relative_to(study.folder).as_posix()
+            if path.is_file() and not relative.startswith(VARYING):
+                digests[relative] = hashlib.sha256(path.read_bytes()).hexdigest()
+    return digests
 
 
-def cleared(study):
-    """As before the first run."""
-    for name in (*MADE, ".snakemake"):
+def remove_outputs(study):
+    """Restore the folder as it was before the first run."""
+    for name in (*OUTPUT_FOLDERS, ".snakemake"):
         shutil.rmtree(study.path(name), ignore_errors=True)
 
 
-def files_made(study):
-    """How many files there are that runs make, what they note for themselves
-    included."""
-    # Folders and files that go while they are counted are not counted.
+def count_files(study):
+    """Count the files that runs make, including Snakemake's own."""
+    # Folders and files that disappear during the count are not counted.
     return sum(
         len(names)
-        for made in (*MADE, ".snakemake")
-        for _, _, names in os.walk(study.path(made))
+        for folder in (*OUTPUT_FOLDERS, ".snakemake")
+        for _, _, names in os.walk(study.path(folder))
     )
 
 
-def started(study, files=0):
-    """A plain run in a process group of its own, under way to its end once there are so
-    many files."""
+def start_run(study, files=0):
+    """Start a plain run in its own process group, and return it when it has made a
+    number of files or has ended."""
     run = subprocess.Popen(
         **study.command("-j2"),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         start_new_session=True,
     )
-    while files_made(study) < files and run.poll() is None:
+    while count_files(study) < files and run.poll() is None:
         time.sleep(0.005)
     return run
 
 
-def ended_by_itself(study):
-    """Last lines of a plain run that has to finish."""
-    done = study.snakemake("-j2")
-    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+def run_to_the_end(study):
+    """Run Snakemake, and check that it finishes."""
+    finished = study.snakemake("-j2")
+    output = finished.stdout[-2000:] + finished.stderr[-2000:]
+    assert finished.returncode == 0, output
 
 
-def killed(study, victim, moments, draws):
-    """Kill a part of a run at one of the moments, drawn again until there was something
-    to kill; the moment, in files.
+def kill(run, victim, rng):
+    """Kill one job of a run, drawn at random, Snakemake itself, or its process group."""
+    # A job that has ended in the meantime is not hit, and its run succeeds.
+    with suppress(psutil.NoSuchProcess, IndexError):
+        if victim == "group":
+            os.killpg(run.pid, signal.SIGKILL)
+        elif victim == "snakemake":
+            run.kill()
+        else:
+            jobs = psutil.Process(run.pid).children(recursive=True)
+            rng.choice(jobs).kill()
 
-    `victim`: one of "job", "snakemake", "group". `draws`: chooses the job.
+
+def disturb_run(study, victim, largest_count, rng):
+    """Start runs until one has been killed.
+
+    Parameters
+    ----------
+    study : Study
+    victim : "job", "snakemake" or "group"
+    largest_count : int
+        The number of files at which a run is killed is below this one.
+    rng : random.Random
+        Draws the number of files and the job.
+
+    Returns
+    -------
+    int
+        Number of files at which the run was killed.
     """
     code = 0
     while code == 0:
-        cleared(study)
-        files = draws.choice(moments)
-        run = started(study, files)
-        hit = run.poll() is None
-        # A job that has ended meanwhile is not hit, and its run ends well.
-        with suppress(psutil.NoSuchProcess, IndexError):
-            if hit and victim == "group":
-                os.killpg(run.pid, signal.SIGKILL)
-            elif hit:
-                (
-                    run
-                    if victim == "snakemake"
-                    else draws.choice(psutil.Process(run.pid).children(recursive=True))
-                ).kill()
+        remove_outputs(study)
+        files = rng.choice(range(largest_count))
+        run = start_run(study, files)
+        is_running = run.poll() is None
+        if is_running:
+            kill(run, victim, rng)
         code = run.wait()
-        assert hit or code == 0, f"a run that nobody killed ended with {code}"
+        assert is_running or code == 0, f"a run that was not killed ended with {code}"
     return files
 
 
+def run_twice_at_once(study, lag):
+    """Start a second run when the first has made `lag` files, and return both exit
+    codes. Snakemake may refuse one of the runs."""
+    remove_outputs(study)
+    first = start_run(study, lag)
+    second = start_run(study)
+    codes = first.wait(), second.wait()
+    assert 0 in codes, codes
+    return codes
+
+
 def soak(folder, kills, seed):
-    """All of it, said line by line."""
-    draws = random.Random(seed)
-    study = part_of_the_study(Path(folder) / "study")
-    ended_by_itself(study)
-    expected = contents(study)
-    files = files_made(study)
+    """Inject all faults, and print a line for each."""
+    rng = random.Random(seed)
+    study = make_study(Path(folder) / "study")
+    run_to_the_end(study)
+    expected = digest_outputs(study)
+    files = count_files(study)
     print(
         f"undisturbed: {files} files, {len(expected)} of them to be identical",
         flush=True,
@@ -149,27 +177,20 @@ def soak(folder, kills, seed):
     counts = dict.fromkeys(VICTIMS, 0)
     for number in range(kills):
         victim = VICTIMS[number % 3]
-        at = killed(study, victim, range(files), draws)
+        files_at_kill = disturb_run(study, victim, files, rng)
         counts[victim] += 1
-        ended_by_itself(study)
-        assert contents(study) == expected, (victim, at)
+        run_to_the_end(study)
+        assert digest_outputs(study) == expected, (victim, files_at_kill)
         print(
-            f"{number + 1}: {victim} killed at {at} files, finished, identical",
+            f"{number + 1}: {victim} killed at {files_at_kill} files, finished,"
+            " identical",
             flush=True,
         )
-    for apart in (0, 1, files // 2):
-        # The second starts when the first has made so many files. One of them may be
-        # refused; what they leave is that of one.
-        cleared(study)
-        first = started(study, apart)
-        second = started(study)
-        codes = first.wait(), second.wait()
-        assert 0 in codes, codes
-        ended_by_itself(study)
-        assert contents(study) == expected
-        print(
-            f"two runs {apart} files apart: exit codes {codes}, identical", flush=True
-        )
+    for lag in (0, 1, files // 2):
+        codes = run_twice_at_once(study, lag)
+        run_to_the_end(study)
+        assert digest_outputs(study) == expected
+        print(f"two runs {lag} files apart: exit codes {codes}, identical", flush=True)
     print(f"kills survived: {counts}")
 
 
@@ -177,6 +198,6 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--kills", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
+    arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as top:
-        soak(top, given.kills, given.seed)
+        soak(top, arguments.kills, arguments.seed)

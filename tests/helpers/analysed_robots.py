@@ -1,4 +1,5 @@
-"""Robots as the analysis reads them, for comparison with the plant's own reading."""
+"""Robots as the analysis reads them, for comparison with the simulation's own
+reader."""
 
 from pathlib import Path
 
@@ -8,5 +9,5 @@ ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 
 
 def analysed(name):
-    """Robot of elastocal.mechanics.robot."""
+    """Read a robot of the repository by its name."""
     return read_robot(ROBOTS / f"{name}.yaml")

@@ -1,5 +1,5 @@
-"""Small campaigns of the plant, diagnosed, with the files that an audit reads, and what
-it finds in these."""
+"""Small simulated campaigns that are diagnosed, the files that an audit reads of them,
+and the findings of the audit."""
 
 from analysed_robots import ROBOTS
 from made_audits import CONFIGURATION
@@ -24,7 +24,7 @@ from elastocal_proof.plant.campaigns import Design, draw_schedule
 from elastocal_proof.plant.kinds import apply_defects, draw_defect
 from elastocal_proof.plant.simulated_robot import draw_specimen
 
-USUAL = {
+DEFAULT_DESIGN = {
     "poses": 12,
     "held_out": 4,
     "ladder": (0.0, 1.0, -1.0),
@@ -34,12 +34,12 @@ USUAL = {
 
 
 def diagnosed_campaign(top, robot, effects=(), **design):
-    """Measure a robot of the plant with some defects, diagnose it, and write what an
-    audit reads of it: the campaign `cell`."""
+    """Measure a simulated robot with some defects, diagnose it, and write the files that
+    an audit reads, as the campaign `cell`."""
     file = ROBOTS / f"{robot}.yaml"
     arm = read_arm(file)
-    planned = Design(**USUAL | {"points": arm.points[-1:]} | design)
-    bad = apply_defects(
+    planned_design = Design(**DEFAULT_DESIGN | {"points": arm.points[-1:]} | design)
+    specimen = apply_defects(
         draw_specimen(arm, 4, weighs=False),
         [draw_defect(effect, arm, 4) for effect in effects],
     )
@@ -47,36 +47,42 @@ def diagnosed_campaign(top, robot, effects=(), **design):
         top / "cell",
         "cell",
         file,
-        Experiment(bad, planned, draw_schedule(arm, planned, 3)),
+        Experiment(specimen, planned_design, draw_schedule(arm, planned_design, 3)),
     )
     results = top / "results/loop/cell"
     reports = top / "reports/loop/cell"
     results.mkdir(parents=True)
     reports.mkdir(parents=True)
-    descriptions, *parts = load_campaign(read_campaign_folder(top / "cell", ROBOTS))
-    for name, part in zip(("training", "held_out"), parts, strict=True):
+    descriptions, *measurements = load_campaign(
+        read_campaign_folder(top / "cell", ROBOTS)
+    )
+    for name, of_set in zip(("training", "held_out"), measurements, strict=True):
         write_table(
             results / f"{name}.parquet",
             schemas.build_measurements_schema(arm.joints),
-            [tabulate_measurements(part)],
+            [tabulate_measurements(of_set)],
             {},
         )
     write_json(results / "campaign.json", descriptions)
     case, unseen = (
-        build_case(descriptions, tabulate_measurements(part)) for part in parts
+        build_case(descriptions, tabulate_measurements(of_set))
+        for of_set in measurements
     )
-    found = diagnose(case, Settings(), 1)
+    diagnosis = diagnose(case, Settings(), 1)
     write_json(
         results / "diagnosis.json",
-        tables.serialize_diagnosis(found)
-        | {"covariance": found.final.covariance.tolist()},
+        tables.serialize_diagnosis(diagnosis)
+        | {"covariance": diagnosis.final.covariance.tolist()},
     )
     write_table(
-        results / "steps.parquet", schemas.STEPS, tables.generate_step_blocks(found), {}
+        results / "steps.parquet",
+        schemas.STEPS,
+        tables.generate_step_blocks(diagnosis),
+        {},
     )
-    # As the next job does: from the files.
-    again = tables.restore_diagnosis(case, tables.serialize_diagnosis(found))
-    blocks = generate_residual_blocks(again, judge_and_predict(again, unseen, 1))
+    # The next job restores the diagnosis from the files, too.
+    restored = tables.restore_diagnosis(case, tables.serialize_diagnosis(diagnosis))
+    blocks = generate_residual_blocks(restored, judge_and_predict(restored, unseen, 1))
     write_table(
         reports / "residuals.parquet",
         schemas.build_residuals_schema(arm.joints),
@@ -87,8 +93,8 @@ def diagnosed_campaign(top, robot, effects=(), **design):
 
 
 def audit_of(top, *files):
-    """Findings of files of the campaign `cell`, all of them by default, every row
-    looked at."""
+    """Return the findings about files of the campaign `cell`, by default about all of
+    them; every row is checked."""
     run = FinishedRun(top, CONFIGURATION, {}, {}, 10**6)
     files = files or [
         path.relative_to(top).as_posix() for path in sorted(top.glob("re*/loop/cell/*"))

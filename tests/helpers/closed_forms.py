@@ -1,4 +1,4 @@
-"""Closed forms of effects: how they displace every measuring point, by pinocchio.
+"""Closed forms of effects: the displacement of every measuring point, by pinocchio.
 
 A closed form is a function ``closed(arm, law, name, *shapes)`` of an `Arm`, a candidate,
 the name of one of its parameters and one value of each of its shapes. It returns the
@@ -25,13 +25,13 @@ CHAINS = {"fanuc": None, "track": TRACK} | {
     name: OTHER_CHAINS[name] for name in ("fixed rotations", "seven joints", "ur10")
 }
 STATES = 4
-# Gravity on a robot that hangs askew.
+# Gravity on a robot that is mounted at an angle.
 GRAVITY = (3.0, -4.0, -8.0)
-# A link shorter than this does not bend.
+# Links shorter than this count as rigid.
 LONG_M = 0.05
-# Declared masses of a robot whose file has some.
+# Declared masses of a robot.
 MASSES = (Mass(2, 40.0, (0.1, -0.02, 0.3), 0.1), Mass(3, 15.0, (-0.05, 0.1, 0.02), 0.1))
-# Arms under loads anywhere, in a pull, and with declared masses.
+# Kinds of arms: under random loads, pulled by a cable, and with declared masses.
 PLAIN = "plain"
 PULLED = "pulled"
 WEIGHED = "weighed"
@@ -45,7 +45,7 @@ class Arm:
 
     def __init__(self, chain, *, pulled):
         self.chain, self.joints = chain, chain.coordinates
-        # From a load that play takes up to one beyond the knee of every gear.
+        # Loads range from the backlash of a gear to beyond the knee of every gear.
         self.states = make_states(self.joints, STATES, seed=1, force=1.0)
         self.states.wrench[:] *= np.geomspace(10.0, 2e4, STATES)[:, None]
         self.compliance = 1e-6 * np.arange(1, self.joints + 1)
@@ -173,11 +173,11 @@ def of_the_joint(amount):
 
 def six(arm, after, axes, name, amount, first=None):
     """Shift or rotate the arm behind a frame along one of the axes (S, 3, 3), which the
-    name states: dx, ry, shift_x, turn_x."""
+    name of the parameter states: dx, ry, shift_x or turn_x."""
     along = axes[..., "xyz".index(name[-1])] * np.broadcast_to(amount, STATES)[:, None]
-    none = np.zeros((STATES, 3))
+    zero = np.zeros((STATES, 3))
     turns = name[0] == "r" or name.startswith("turn")
-    return arm.moved(after, none if turns else along, along if turns else none, first)
+    return arm.moved(after, zero if turns else along, along if turns else zero, first)
 
 
 @cache
@@ -219,12 +219,13 @@ def check_closed_form(list_candidates, closed, chain_name):
                 np.testing.assert_allclose(
                     computed, expected, rtol=0, atol=1e-7 * scale + 1e-14, err_msg=name
                 )
-                # On an industrial arm, zero is not compared with zero.
+                # On an industrial arm every effect displaces some point.
                 assert chain_name != "fanuc" or expected.any(), name
 
 
 def values_of_shapes(law):
-    """Where a fit starts, and a quarter up the range of each shape if there are any."""
+    """Return the starts of the shape parameters and, if there are any, the values at a
+    quarter of their ranges."""
     starts = [shape.start for shape in law.shapes]
     quarters = [
         shape.lowest + (shape.highest - shape.lowest) / 4 for shape in law.shapes

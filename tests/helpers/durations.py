@@ -1,18 +1,18 @@
-"""How long something takes, asked so that slow, fast and busy machines answer alike."""
+"""Limits of durations that hold on slow, fast and busy machines."""
 
 import time
 from contextlib import contextmanager
 
-# Waiting for longer means that what is waited for never comes: an hour, for what takes
-# a minute on a machine that is not busy.
+# After this time a process counts as hung. An hour is ample for runs that take a minute
+# on an idle machine.
 HUNG_S = 3600
-# Of CPU time, for what takes milliseconds.
+# CPU time that is ample for work of milliseconds.
 _AT_ONCE_S = 5.0
 
 
 @contextmanager
 def at_once():
-    """The block does not work on for ever."""
+    """Check that the block does not take long."""
     begin = time.process_time()
     yield
     assert time.process_time() - begin < _AT_ONCE_S

@@ -1,4 +1,4 @@
-"""Tables of other programs, imported as tests write them."""
+"""Tables of other programs, written and imported by tests."""
 
 from elastocal.exchange.measurement_table import ImportOptions, read_measurement_table
 
@@ -7,6 +7,6 @@ ROW = "1,2,3"
 
 
 def table(folder, text, options=PLAIN, robot=None):
-    """What a text is read as."""
+    """Write a text to a file, and import it."""
     (folder / "t.csv").write_text(text)
     return read_measurement_table(folder / "t.csv", options, robot)

@@ -1,4 +1,4 @@
-"""Contents of a certificate, made up."""
+"""Synthetic contents of a certificate."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -8,15 +8,15 @@ import yaml
 from elastocal.verdict import Accuracy
 
 
-def make_document(decision="pass", misplaced=False, **conformity):
+def make_document(decision="pass", *, misplaced=False, **conformity):
+    """Make the document of a certificate with some entries of its conformity."""
     document = yaml.safe_load(
         Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")
     )
-    sentences = (
-        [{"sentence": "reflector or tool sits 5.0 mm from where it is declared"}]
-        if misplaced
-        else []
-    )
+    sentences = []
+    if misplaced:
+        sentence = "reflector or tool sits 5.0 mm from where it is declared"
+        sentences.append({"sentence": sentence})
     judged = document["conformity"] | {"decision": decision} | conformity
     return document | {
         "accuracy": asdict(

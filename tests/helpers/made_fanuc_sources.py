@@ -1,4 +1,4 @@
-"""Made-up measurements of the FANUC in the formats of both its public sources."""
+"""Synthetic measurements of the FANUC in the formats of its two public sources."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ REPEATS = 3
 
 
 def reflectors(chain, angles, seed):
-    """Positions (N, 3 reflectors, 3) in some tracker's frame."""
+    """Return positions (N, 3 reflectors, 3) in the frame of a tracker."""
     rng = np.random.default_rng(seed)
     position, rotation = compute_poses(chain, angles, chain.end_effector)
     flange = position[:, None] + np.einsum("nij,kj->nki", rotation, OFFSETS)
@@ -22,15 +22,15 @@ def reflectors(chain, angles, seed):
 
 
 def model_angles(degrees, elbow):
-    """The chain's angles in rad from a controller's in degrees, written out; `elbow` is
-    the angle between the arms."""
+    """Return the angles of the chain in rad from those of the controller in degrees;
+    `elbow` is the angle between the arms."""
     j1, j2, _, j4, j5, j6 = degrees.T
     return np.radians(np.column_stack([j1, j2 - 90, 90 - elbow, -j4, -j5, -j6]))
 
 
 def static_source(fanuc, folder):
-    """File of the static source and what the campaign of it must hold: joint angles and
-    positions, row by row."""
+    """Write a file of the static source. Return its path, and the joint angles and
+    positions that its campaign must contain, row by row."""
     degrees = (
         np.random.default_rng(1).uniform(-50, 50, (POSES, 6)).repeat(REPEATS, axis=0)
     )
@@ -43,7 +43,7 @@ def static_source(fanuc, folder):
 
 
 def cpa_source(fanuc, folder):
-    """The same for the source of one joint at a time."""
+    """Do the same for the source that moves one joint at a time."""
     degrees = np.random.default_rng(3).uniform(-50, 50, (POSES, 6))
     angles = model_angles(degrees, degrees[:, 1] + degrees[:, 2])
     positions = reflectors(fanuc.chain, angles, 4)
@@ -55,6 +55,7 @@ def cpa_source(fanuc, folder):
 
 
 def assert_holds(measurements, angles, positions):
+    """Check that measurements have these joint angles and positions, and no loads."""
     assert len(measurements) == 3 * len(angles)
     np.testing.assert_allclose(
         measurements.joint_angles, angles.repeat(3, axis=0), rtol=0, atol=1e-12

@@ -1,4 +1,4 @@
-"""Folders of small campaigns, as a user of a robot and a tracker would bring them."""
+"""Folders of small campaigns, as a user with a robot and a tracker would write them."""
 
 from pathlib import Path
 
@@ -12,8 +12,8 @@ PLAN = Plan(("3DoF", "6DoF"), 14, 800.0, (0, 1), (0.0, 0.5, 0.0), 2, 4, 6e-5, 6e
 
 
 def make_table(robot, name, seed=1, plan=PLAN, offset_of_joint_3=0.0):
-    """Measurements of a robot whose third joint stands beyond what it reports, in no
-    order."""
+    """Simulate measurements, in random order, of a robot whose third joint has an
+    offset."""
     table = draw_measurements(robot, plan, seed, name)
     table["q3"] = table["q3"] - offset_of_joint_3
     order = np.random.default_rng(seed).permutation(len(table["pose"]))
@@ -21,7 +21,7 @@ def make_table(robot, name, seed=1, plan=PLAN, offset_of_joint_3=0.0):
 
 
 def make_folder(folder, robot, /, name="made", kind="csv", table=None, **changes):
-    """A campaign's folder."""
+    """Write the folder of a campaign."""
     table = make_table(robot, name) if table is None else table
     document = yaml.safe_load(
         Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Small data sets and results of a league."""
+"""Small data sets and results of a benchmark."""
 
 import numpy as np
 import pandas as pd
@@ -11,7 +11,7 @@ from elastocal_proof.league.methods import DataSet, deal_folds
 
 
 def make_data_set(folder, robot, robots_folder, poses=24, **changes):
-    """A data set of an unloaded robot that misses its poses by something smooth."""
+    """Make a data set of an unloaded robot whose errors are smooth."""
     changes = {
         "frame": "tracker",
         "offset_m": "unknown",
@@ -21,20 +21,20 @@ def make_data_set(folder, robot, robots_folder, poses=24, **changes):
     descriptions, campaign = read_described_campaign(
         read_campaign_folder(folder, robots_folder)
     )
-    seen = campaign.measurements
+    measurements = campaign.measurements
     return DataSet(
         descriptions,
-        tabulate_measurements(seen),
-        deal_folds(seen, 4, np.random.default_rng(1)),
+        tabulate_measurements(measurements),
+        deal_folds(measurements, 4, np.random.default_rng(1)),
     )
 
 
 def make_entries(size_m, poses=40, seed=1, std_m=None, folds=4):
-    """Rows of the entries table with errors of some size, each pose seen by two
-    targets."""
-    draws = np.random.default_rng(seed)
+    """Draw rows of the entries table with errors of some size; each pose is measured
+    with two targets."""
+    rng = np.random.default_rng(seed)
     pose = np.repeat(np.arange(poses), 2)
-    off = draws.normal(0.0, size_m, (2 * poses, 3))
+    error = rng.normal(0.0, size_m, (2 * poses, 3))
     columns = {
         "fold": pose % folds + 1,
         "set": np.zeros(2 * poses, int),
@@ -42,7 +42,7 @@ def make_entries(size_m, poses=40, seed=1, std_m=None, folds=4):
         "pose": pose,
     }
     columns |= {"load": np.zeros(2 * poses, int), "target": np.tile([0, 1], poses)}
-    columns |= {f"d{axis}": off[:, number] for number, axis in enumerate("xyz")}
+    columns |= {f"d{axis}": error[:, number] for number, axis in enumerate("xyz")}
     return pd.DataFrame(
         columns
         | {
@@ -53,9 +53,9 @@ def make_entries(size_m, poses=40, seed=1, std_m=None, folds=4):
 
 
 def make_results(data=("one", "two"), splits=("random", "blocks", "session")):
-    """Entries of three methods, by data set, split and method: geometry, one half as
-    wrong, and one that states intervals."""
-    found = {}
+    """Make the entries of three methods by data set, split and method: the geometry,
+    one with half its error, and one that states intervals."""
+    results = {}
     for number, name in enumerate(data):
         for split in splits:
             for method, size, std in (
@@ -63,7 +63,7 @@ def make_results(data=("one", "two"), splits=("random", "blocks", "session")):
                 ("half", 1e-4, None),
                 ("process", 1.2e-4, 1.2e-4),
             ):
-                found[name, split, method] = make_entries(
+                results[name, split, method] = make_entries(
                     size, 30 + 10 * number, number + 1, std
                 )
-    return found
+    return results

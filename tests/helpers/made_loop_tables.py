@@ -158,6 +158,7 @@ def effect_entry(
     parameters=("half_play",),
     alternatives=(),
     locations=None,
+    *,
     adopted=True,
     cost_m=8.5e-5,
 ):

@@ -1,4 +1,4 @@
-"""Metrics, replicates and scores of further studies, made up, and small studies in
+"""Synthetic metrics, replicates and scores of further studies, and small studies in
 memory."""
 
 import numpy as np
@@ -13,8 +13,8 @@ SIZE = StudySize(data_sets=4, configurations=5, tests=30, noise=1e-5)
 
 
 def studies_of(robot="arm", strategy="A", biases=(20.0, 22.0, 24.0)):
-    """Studies whose k_sigma and deviation fall as bias / length: percent and µm."""
-    parts = []
+    """Make studies whose k_sigma (percent) and deviation (µm) fall as bias / length."""
+    frames = []
     for number, bias in enumerate(biases, 1):
         frame = pd.DataFrame(
             {"robot": robot, "study": number, "strategy": strategy, "length": LENGTHS}
@@ -23,12 +23,12 @@ def studies_of(robot="arm", strategy="A", biases=(20.0, 22.0, 24.0)):
         frame["k_sigma_fixed_joints"] = 0.5 * bias / LENGTHS
         frame["deviation"] = 1e-6 * bias / LENGTHS
         frame["compliance_1"] = 1e-6 * bias
-        parts.append(frame)
-    return pd.concat(parts, ignore_index=True)
+        frames.append(frame)
+    return pd.concat(frames, ignore_index=True)
 
 
 def few_of(robot, key="kuka"):
-    """A study of six data sets of 20 configurations."""
+    """Make a study of six data sets of 20 configurations."""
     return StudyInMemory(
         robot,
         key,
@@ -39,7 +39,7 @@ def few_of(robot, key="kuka"):
 
 
 def metrics_of(strategy, bias=100.0, robot="arm"):
-    """Metrics whose k_sigma and deviation fall as bias / length: percent and µm."""
+    """Make metrics whose k_sigma (percent) and deviation (µm) fall as bias / length."""
     frame = pd.DataFrame(
         {"robot": robot, "noise_um": 200.0, "strategy": strategy, "length": LENGTHS}
     )
@@ -56,8 +56,9 @@ def metrics_of(strategy, bias=100.0, robot="arm"):
 
 
 def replicates_of(strategy, bias=100.0, robot="arm", spread=(-0.1, 0.0, 0.1)):
-    parts = []
+    """Make replicates of metrics, whose biases differ by a relative spread."""
+    frames = []
     for number, relative in enumerate(spread, 1):
         frame = metrics_of(strategy, bias * (1 + relative), robot)
-        parts.append(frame.assign(replicate=number))
-    return pd.concat(parts, ignore_index=True)
+        frames.append(frame.assign(replicate=number))
+    return pd.concat(frames, ignore_index=True)

@@ -1,4 +1,4 @@
-"""Small surveys and candidates to plan with."""
+"""Small surveys and candidates for tests of planning."""
 
 import numpy as np
 from analysed_robots import analysed
@@ -11,8 +11,8 @@ from elastocal.campaigns.campaign import Target
 OPEN = Cell((), None, 0.1)
 
 
-def make_survey(name="ur10", measured="position", unknown_base=True):
-    """One reflector at an unknown place of the end effector."""
+def make_survey(name="ur10", measured="position", *, unknown_base=True):
+    """Make a survey with one reflector at an unknown offset from the end effector."""
     robot = analysed(name)
     target = Target("T", robot.chain.end_effector.name, None)
     return Survey(
@@ -21,14 +21,14 @@ def make_survey(name="ur10", measured="position", unknown_base=True):
 
 
 def make_rows(count=40, numbers=6, parameters=5, seed=1):
-    """Rows of candidates of unlike size and direction."""
-    draws = np.random.default_rng(seed)
+    """Draw rows of candidates with different sizes and directions."""
+    rng = np.random.default_rng(seed)
     return (
-        draws.standard_normal((count, numbers, parameters))
-        * draws.uniform(0.1, 3.0, (count, 1, 1))
+        rng.standard_normal((count, numbers, parameters))
+        * rng.uniform(0.1, 3.0, (count, 1, 1))
     ).astype(np.float32)
 
 
 def make_candidates(survey, count=200, cell=OPEN):
-    """Configurations that a cell allows."""
+    """Draw configurations that a cell allows."""
     return find_allowed_candidates(survey, cell, count, 1)

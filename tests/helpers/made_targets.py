@@ -1,4 +1,4 @@
-"""Joint targets for programs of controllers, and numbers read back of such programs."""
+"""Joint targets for controller programs, and the numbers in such programs."""
 
 import re
 
@@ -10,12 +10,13 @@ ANGLES = np.random.default_rng(6).uniform(-3, 3, (4, 6))
 RAIL = np.array([[0.25], [-1.5], [0.0], [3.125]])
 
 
-def make_targets(controller, rail=False, stated=""):
-    """Four targets of six axes, with `rail` on a rail before them."""
+def make_targets(controller, *, rail=False, stated=""):
+    """Make four targets of six axes, which follow a rail if `rail`."""
     angles = np.hstack([RAIL, ANGLES]) if rail else ANGLES
     prismatic = (True,) * rail + (False,) * 6
     return build_targets(angles, prismatic, find_axes(controller, prismatic, stated))
 
 
 def numbers(text):
-    return [float(word) for word in re.findall(r"-?\d+\.\d+", text)]
+    """Return all decimal numbers of a text."""
+    return [float(number) for number in re.findall(r"-?\d+\.\d+", text)]

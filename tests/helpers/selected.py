@@ -1,11 +1,11 @@
-"""Cases of which a few are tried at each run of the tests and the others with `make
+"""Selection of the cases that run with every test run; the others run with `make
 test-slow`."""
 
 import pytest
 
 
 def slow_but(fast, cases):
-    """Parameters in their order; those that are not `fast` are slow."""
+    """Return the cases in their order, and mark those as slow that are not `fast`."""
     assert {*fast} <= {*cases}
     return [
         case if case in fast else pytest.param(case, marks=pytest.mark.slow)

@@ -1,5 +1,5 @@
-"""A few poses of an arm of seven joints on a lift, as a service robot has it: wrong
-zeros and lengths, drives with play."""
+"""A few poses of a service robot, an arm of seven joints on a lift, with wrong zeros and
+lengths and with backlash in its drives."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -14,16 +14,16 @@ from elastocal.mechanics.robot_file import parse_robot
 SERVICE_ARM = yaml.safe_load(
     Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")
 )
-# rad; of the lift m.
+# Backlash of the drives, rad; of the lift, m.
 _PLAY = 5e-3 * np.array([0.2, 1, 1, 1, 1, 1, 1, 1])
 
 
 def service_arm_folder(folder, seed, poses=34, noise_m=3e-4):
-    """A campaign as `elastocal init` declares it; errors of 5 mm of which a calibration
-    can mend little."""
-    draws = np.random.default_rng((7, seed))
+    """Write a campaign as `elastocal init` declares it, with errors of 5 mm that a
+    calibration can hardly reduce."""
+    rng = np.random.default_rng((7, seed))
     lengths = {
-        name: value + 1e-3 * draws.standard_normal()
+        name: value + 1e-3 * rng.standard_normal()
         for name, value in SERVICE_ARM["lengths_m"].items()
     }
     true = replace(
@@ -32,12 +32,12 @@ def service_arm_folder(folder, seed, poses=34, noise_m=3e-4):
     )
     plan = Plan(("8DoF",), poses, 0.0, (0,), (0.0, 0.0, 0.0), 1, 0, 1e-3, 1e-3)
     table = draw_measurements(true, plan, seed, "service")
-    zeros = 0.2 * _PLAY * draws.standard_normal(8)
+    zeros = 0.2 * _PLAY * rng.standard_normal(8)
     for joint in range(8):
         table[f"q{joint + 1}"] = (
             table[f"q{joint + 1}"]
             + zeros[joint]
-            + _PLAY[joint] * draws.standard_normal(poses)
+            + _PLAY[joint] * rng.standard_normal(poses)
         )
     changes = {
         "robot": "robot.yaml",

@@ -1,5 +1,5 @@
-"""Starts of Snakemake that share its imports, half of a start: a process that has made
-them forks for each."""
+"""Starts Snakemake in forks of a process that has already imported it, because the
+imports take half of a start."""
 
 import atexit
 import gc
@@ -14,8 +14,8 @@ from pathlib import Path
 
 from durations import HUNG_S
 
-# What the plug-ins and the rules import of other people; nothing of elastocal, of which
-# each folder has its own.
+# Modules that the plug-ins and the rules import. elastocal is not one of them, because
+# each folder has its own copy.
 SHARED = (
     "grimp",
     "jsonschema",
@@ -30,7 +30,7 @@ SHARED = (
 
 @cache
 def _server():
-    """One for each process of the tests."""
+    """Start the server; each process of the tests has its own."""
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
     server = subprocess.Popen(
         [sys.executable, __file__],
@@ -43,19 +43,19 @@ def _server():
 
 
 def started(args, cwd, env):
-    """`subprocess.run` of `python -m snakemake ...`, with its output as text."""
+    """Run `python -m snakemake ...` like `subprocess.run`, with its output as text."""
     assert args[:3] == [sys.executable, "-m", "snakemake"]
     with tempfile.TemporaryDirectory() as folder:
         texts = [Path(folder) / name for name in ("stdout", "stderr")]
         for path in texts:
             path.touch()
-        asked = {
+        request = {
             "arguments": list(map(str, args[3:])),
             "folder": str(cwd),
             "environment": env,
             "texts": list(map(str, texts)),
         }
-        print(json.dumps(asked), file=_server().stdin, flush=True)
+        print(json.dumps(request), file=_server().stdin, flush=True)
         if not select.select([_server().stdout], [], [], HUNG_S)[0]:
             raise subprocess.TimeoutExpired(args, HUNG_S)
         return subprocess.CompletedProcess(
@@ -66,26 +66,28 @@ def started(args, cwd, env):
 
 
 def _serve():
+    """Run Snakemake in a fork for each request on standard input, and answer with its
+    exit code."""
     import snakemake.cli
 
     for name in SHARED:
         __import__(name)
     gc.freeze()
     for line in sys.stdin:
-        asked = json.loads(line)
+        request = json.loads(line)
         if child := os.fork():
             print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
             continue
-        os.chdir(asked["folder"])
+        os.chdir(request["folder"])
         os.environ.clear()
-        os.environ.update(asked["environment"])
+        os.environ.update(request["environment"])
         sys.path[0:1] = [
-            asked["folder"],
-            *asked["environment"]["PYTHONPATH"].split(os.pathsep),
+            request["folder"],
+            *request["environment"]["PYTHONPATH"].split(os.pathsep),
         ]
-        for number, path in enumerate((os.devnull, *asked["texts"])):
+        for number, path in enumerate((os.devnull, *request["texts"])):
             os.dup2(os.open(path, os.O_RDWR), number)
-        sys.argv = ["snakemake", *asked["arguments"]]
+        sys.argv = ["snakemake", *request["arguments"]]
         snakemake.cli.main()
 
 

@@ -1,5 +1,5 @@
-"""A folder that holds the study: made from the repository's sources, edited, run, and
-looked at."""
+"""A folder with the study: made from the sources of the repository, edited, run and
+inspected."""
 
 import os
 import re
@@ -22,11 +22,11 @@ SOURCES = (
     "README.md",
 )
 SOURCES += ("paper", "CITATION.cff")
-# Changes of config.yaml that make a study of minutes.
+# Changes of config.yaml with which the study takes minutes.
 SMALL = yaml.safe_load(
     Path(__file__).with_name("small_study.yaml").read_text(encoding="utf-8")
 )
-# What most tests need of it: the paper's tables and figures of one robot.
+# Changes for most tests: the paper's tables and figures of one robot.
 ROBOT = "kuka"
 LEVEL = "200"
 PAPER = "paper"
@@ -49,7 +49,8 @@ class Study:
 
     @classmethod
     def of_sources(cls, folder, changes=None):
-        """The repository's sources alone, set to the small study with `changes`."""
+        """Copy the sources of the repository, and configure the small study with some
+        changes."""
         study = cls(folder)
         study.folder.mkdir(parents=True)
         for name in SOURCES:
@@ -69,13 +70,13 @@ class Study:
 
     @classmethod
     def of_links(cls, folder):
-        """The repository's sources as they are, with results of their own."""
+        """Link to the sources of the repository; the results are separate."""
         for name in SOURCES:
             (folder / name).symlink_to(REPOSITORY / name)
         return cls(folder)
 
     def copied_to(self, folder):
-        """The same folder elsewhere, times of its files included."""
+        """Copy the folder with the times of its files."""
         shutil.copytree(self.folder, folder)
         return Study(folder)
 
@@ -83,15 +84,17 @@ class Study:
         return self.folder / name
 
     def configure(self, changes):
-        """Change keys of config.yaml; a mapping changes some keys of a mapping."""
+        """Change entries of config.yaml. A mapping is merged into the present one."""
         file = self.path("config.yaml")
         config = yaml.safe_load(file.read_text(encoding="utf-8"))
         for key, value in changes.items():
-            config[key] = config[key] | value if isinstance(value, dict) else value
+            if isinstance(value, dict):
+                value = config[key] | value
+            config[key] = value
         file.write_text(yaml.safe_dump(config, sort_keys=False), encoding="utf-8")
 
     def replace(self, name, old, new):
-        """Edit a source; `old` must be there once."""
+        """Edit a source, in which `old` must occur once."""
         text = self.path(name).read_text(encoding="utf-8")
         assert text.count(old) == 1, f"{name} holds {old!r} {text.count(old)} times"
         self.path(name).write_text(text.replace(old, new), encoding="utf-8")
@@ -101,11 +104,11 @@ class Study:
             file.write(text)
 
     def edit(self, name):
-        """Change what a source of Python says, and nothing that it does."""
+        """Change the text of a Python source, but not what it does."""
         self.append(name, "\nEDITED = True\n")
 
     def command(self, *arguments):
-        """Arguments of a `subprocess` call that runs Snakemake here."""
+        """Return the arguments of a `subprocess` call that runs Snakemake in the folder."""
         environment = os.environ | {
             "PYTHONPATH": str(self.folder / "src"),
             "OMP_NUM_THREADS": "1",
@@ -121,39 +124,37 @@ class Study:
 
     def run(self, *arguments):
         """Run Snakemake, which must succeed."""
-        done = self.snakemake("-j2", *arguments)
-        assert done.returncode == 0, done.stderr[-3000:]
-        return done
+        finished = self.snakemake("-j2", *arguments)
+        assert finished.returncode == 0, finished.stderr[-3000:]
+        return finished
 
     def planned(self, *arguments):
-        """Jobs that Snakemake would run, as (rule, wildcard, wildcard, ...)."""
-        done = self.snakemake("-n", "-p", *arguments)
-        assert done.returncode == 0, done.stderr[-3000:]
+        """Return the jobs that Snakemake would run, as (rule, wildcard, wildcard, ...)."""
+        finished = self.snakemake("-n", "-p", *arguments)
+        assert finished.returncode == 0, finished.stderr[-3000:]
         jobs = []
-        for rule, body in _JOB.findall(done.stdout):
+        for rule, body in _JOB.findall(finished.stdout):
             wildcards = re.search(r"^    wildcards: (.*)$", body, re.MULTILINE)
-            values = (
-                [pair.split("=", 1)[1] for pair in wildcards[1].split(", ")]
-                if wildcards
-                else []
-            )
+            values = []
+            if wildcards:
+                values = [pair.split("=", 1)[1] for pair in wildcards[1].split(", ")]
             jobs.append((rule, *values))
-        total = re.search(r"^total +(\d+)$", done.stdout, re.MULTILINE)
-        assert len(jobs) == (int(total[1]) if total else 0), done.stdout
-        assert total or "Nothing to be done" in done.stdout
+        total = re.search(r"^total +(\d+)$", finished.stdout, re.MULTILINE)
+        assert len(jobs) == (int(total[1]) if total else 0), finished.stdout
+        assert total or "Nothing to be done" in finished.stdout
         return set(jobs)
 
     def inputs_by_rule(self, *arguments):
-        """Files that the jobs of each rule read, from Snakemake's own plan."""
+        """Return the files that the jobs of each rule read, from Snakemake's own plan."""
         plan = self.snakemake("-n", "-p", "--forceall", *arguments)
         assert plan.returncode == 0, plan.stderr[-2000:]
-        found = re.findall(
+        inputs = re.findall(
             r"^(?:local)?rule (\w+):\n    input: (.*)$", plan.stdout, re.MULTILINE
         )
-        return {rule: set(files.split(", ")) for rule, files in found}
+        return {rule: set(files.split(", ")) for rule, files in inputs}
 
     def files(self, *patterns):
-        """Relative paths of files by glob patterns, sorted."""
+        """Return the relative paths of files by glob patterns, sorted."""
         return sorted(
             p.relative_to(self.folder).as_posix()
             for pattern in patterns

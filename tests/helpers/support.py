@@ -1,5 +1,5 @@
-"""What several test files share: refusals, chains in one line, and models of them that
-owe nothing to the package."""
+"""Helpers of several test files: the check of a refusal, chains in one line, and models
+of them that do not depend on the package."""
 
 from contextlib import contextmanager
 from copy import deepcopy
@@ -14,10 +14,19 @@ from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.robot import Robot
 from elastocal.study.simulation import Experiments
 
-UR10 = "Tz(0.1273) Rz(q1) Ty(0.1639) Ry(q2) Tx(0.612) Ry(q3) Tx(0.5723) Ry(q4) Rz(q5) Tz(-0.1157) Ry(q6) Ty(0.0922) [flange]"
+UR10 = (
+    "Tz(0.1273) Rz(q1) Ty(0.1639) Ry(q2) Tx(0.612) Ry(q3) Tx(0.5723) Ry(q4) Rz(q5)"
+    " Tz(-0.1157) Ry(q6) Ty(0.0922) [flange]"
+)
 THREE_JOINTS = "Tz(0.4) Rz(q1) Tx(0.1) Ry(q2) Tx(0.7) [elbow] Ry(q3) Tx(0.6) [hand]"
-SEVEN_JOINTS = "Tz(0.34) Rz(q1) Ry(q2) [shoulder] Tz(0.4) Rz(q3) Ry(-q4) Tz(0.4) [elbow] Rz(q5) Ry(q6) Tz(0.126) Rz(-q7) Tx(0.05) [flange]"
-TURNED = "Rx(90deg) Ty(0.3) Rz(-q1) Rx(-90deg) Tx(0.2) Rz(30deg) Ry(-q2) [A] Tx(-0.5) Rx(45.5deg) Rz(q3) Ty(0.4) Rx(-q4) [B]"
+SEVEN_JOINTS = (
+    "Tz(0.34) Rz(q1) Ry(q2) [shoulder] Tz(0.4) Rz(q3) Ry(-q4) Tz(0.4) [elbow] Rz(q5)"
+    " Ry(q6) Tz(0.126) Rz(-q7) Tx(0.05) [flange]"
+)
+TURNED = (
+    "Rx(90deg) Ty(0.3) Rz(-q1) Rx(-90deg) Tx(0.2) Rz(30deg) Ry(-q2) [A] Tx(-0.5)"
+    " Rx(45.5deg) Rz(q3) Ty(0.4) Rx(-q4) [B]"
+)
 OTHER_CHAINS = {
     "ur10": UR10,
     "three joints": THREE_JOINTS,
@@ -30,25 +39,24 @@ ODD_CHAINS = {"track": TRACK}
 
 
 def chain_of(text, **lengths_m):
-    """Chain from one line."""
+    """Parse a chain from one line."""
     return parse_chain(text, lengths_m, "test")
 
 
 def robot_of(text, compliance=None, links=()):
-    """Robot from one line."""
+    """Make a robot from one line."""
     return robot_on(chain_of(text), compliance, links)
 
 
 def robot_on(chain, compliance=None, links=()):
-    """Robot of a chain, with joint limits that no test needs."""
+    """Make a robot of a chain, with joint limits that no test depends on."""
     n = chain.coordinates
-    compliance = (
-        1e-6 * np.arange(1, n + 1) if compliance is None else np.asarray(compliance)
-    )
+    if compliance is None:
+        compliance = 1e-6 * np.arange(1, n + 1)
     return Robot(
         "test",
         chain,
-        compliance,
+        np.asarray(compliance),
         np.tile([-1.0, 1.0], (n, 1)),
         links,
         np.eye(n),
@@ -57,30 +65,31 @@ def robot_on(chain, compliance=None, links=()):
 
 
 @contextmanager
-def refused(source, key, *words):
-    """The block raises an InputError of one line that names the source, the key and, in
-    `words`, what is allowed."""
-    with pytest.raises(InputError) as caught:
+def refused(source, key, *phrases):
+    """Check that the block raises an InputError of one line, which names the source and
+    the key and contains all phrases."""
+    with pytest.raises(InputError) as raised:
         yield
-    message = str(caught.value)
+    message = str(raised.value)
     assert len(message.splitlines()) == 1, message
     assert message.startswith(str(source)), message
-    named, allowed = message.split("; allowed: ")
-    assert key in named, message
-    assert "found" in named and allowed.strip(), message
-    for word in words:
-        assert str(word) in message, (word, message)
+    fault, allowed = message.split("; allowed: ")
+    assert key in fault, message
+    assert "found" in fault, message
+    assert allowed.strip(), message
+    for phrase in phrases:
+        assert str(phrase) in message, (phrase, message)
 
 
 def random_angles(rng, chain, *batch):
-    """Joint angles over the full turn."""
+    """Draw joint angles over the full turn."""
     return rng.uniform(-np.pi, np.pi, (*batch, chain.coordinates))
 
 
 def random_loads(
     robot, sets, configurations, seed=0, force=1000.0, offset=(0.0, 0.5, 0.0)
 ):
-    """Experiments as the paper makes them, drawn without the package."""
+    """Draw experiments like those of the paper, without the package."""
     rng = np.random.default_rng(seed)
     normal = rng.standard_normal((sets, configurations, 3))
     forces = force * normal / np.linalg.norm(normal, axis=-1, keepdims=True)
@@ -89,8 +98,8 @@ def random_loads(
 
 
 class PinocchioPoint:
-    """A measuring point of a chain as pinocchio sees it: every coordinate a
-    JointModelR. or P., fixed placements between."""
+    """A measuring point of a chain in pinocchio: every coordinate is a revolute or
+    prismatic joint model, with fixed placements between them."""
 
     def __init__(self, chain, point):
         self.chain = chain
@@ -109,8 +118,8 @@ class PinocchioPoint:
                     pin.exp3(transform.constant * unit), np.zeros(3)
                 )
             if transform.coordinate is not None:
-                # Half a turn about another axis, before and after, reverses the sense
-                # of the joint.
+                # Half a turn about another axis, before and after the joint, reverses
+                # its direction.
                 flip = pin.SE3(
                     pin.exp3(np.pi * np.eye(3)[transform.axis - 1]), np.zeros(3)
                 )
@@ -131,24 +140,24 @@ class PinocchioPoint:
         self.data = self.model.createData()
 
     def pose_and_jacobian(self, coordinates):
-        """Position, rotation and Jacobian (linear over angular, base axes) at one
+        """Return position, rotation and Jacobian (linear over angular, base axes) at one
         configuration."""
-        moved = np.array(coordinates, float)[self.order]
+        configuration = np.array(coordinates, float)[self.order]
         aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         jacobian = np.zeros((6, self.chain.coordinates))
-        found = pin.computeFrameJacobian(
-            self.model, self.data, moved, self.frame, aligned
+        columns = pin.computeFrameJacobian(
+            self.model, self.data, configuration, self.frame, aligned
         )
-        jacobian[:, self.order] = np.reshape(
-            found, (6, -1)
-        )  # one joint comes as a plain vector
-        pin.framesForwardKinematics(self.model, self.data, moved)
+        # The Jacobian of a single joint is a plain vector.
+        jacobian[:, self.order] = np.reshape(columns, (6, -1))
+        pin.framesForwardKinematics(self.model, self.data, configuration)
         placement = self.data.oMf[self.frame]
         return placement.translation.copy(), placement.rotation.copy(), jacobian
 
 
 def homogeneous(kind, axis, amount):
-    """Elementary homogeneous transformation of the paper, such as T_z^l or R_y^q."""
+    """Return an elementary homogeneous transformation of the paper, such as T_z^l or
+    R_y^q."""
     matrix = np.eye(4)
     if kind == "T":
         matrix[axis, 3] = amount
@@ -162,17 +171,17 @@ def homogeneous(kind, axis, amount):
 
 
 def without_tool(point):
-    """The point itself, not a target that is shifted from it."""
+    """Return the point itself, without the offset of a target."""
     return replace(point, offset_m=(0.0, 0.0, 0.0))
 
 
 def changed(document, path, value):
-    """A copy with the value at a path of keys replaced, or taken away where the value
-    is None."""
+    """Return a copy with the value at a path of keys replaced, or removed if the new
+    value is None."""
     copy = deepcopy(document)
-    *way, last = path
+    *parents, last = path
     inner = copy
-    for key in way:
+    for key in parents:
         inner = inner[key]
     if value is None:
         del inner[last]

@@ -69,6 +69,7 @@ def make_model(
     holder,
     targets=None,
     rows=3,
+    *,
     fitted_frames=True,
     compliance=None,
     effects=(),

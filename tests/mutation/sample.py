@@ -1,12 +1,12 @@
-"""Mutation testing of a random sample: how often do the tests notice a small fault in
-the code?
+"""Mutation testing of a random sample: how often do the tests detect a small fault in the
+code?
 
-mutmut makes the mutants and says which tests of the same room cover them. Steps of the
-study that none of these runs are run by the small study, whose golden tables are their
-tests. Left out are mutants that only change the text of a string, annotations, and what
-mutmut never changes: code outside functions, and decorated functions.
+mutmut makes the mutants, and finds the tests of the same package that cover them. Steps
+of the study that no such test runs are run by the small study, and its golden tables are
+their tests. Mutants that change only the text of a string are left out. mutmut itself
+leaves out annotations, code outside functions, and decorated functions.
 
-Usage: python tests/mutation/sample.py [SEED SIZE [ROOM ...]], from the top of the
+Usage: python tests/mutation/sample.py [SEED SIZE [PACKAGE ...]], from the top of the
 repository.
 """
 
@@ -38,6 +38,7 @@ from mutmut.utils.format_utils import (
 from mutmut.workers.isolation import get_mutant_runner
 from statsmodels.stats.proportion import proportion_confint
 
+# Time for the tests of one mutant.
 SECONDS = 20.0
 PACKAGE = Path("src/elastocal")
 ROOMS = (
@@ -54,64 +55,70 @@ _STRING = re.compile(r""""[^"]*"|'[^']*'""")
 
 
 def make_mutants():
-    """Write all mutants into ``mutants/``; in this process, for mutmut's pool waits
-    forever for a worker that was killed."""
+    """Write all mutants into ``mutants/``. This process does so itself, because mutmut's
+    pool waits forever for a worker that was killed."""
     copy_src_dir()
     for path in walk_source_files():
-        made = create_file_mutants(path)
-        if made.error:
-            raise made.error
+        mutants = create_file_mutants(path)
+        if mutants.error:
+            raise mutants.error
 
 
-def exit_codes(path):
-    """Exit codes of the tests of a module's mutants by the mutants' names; None for one
-    that has not run."""
+def read_exit_codes(path):
+    """Return the exit codes of the tests of a module's mutants by the names of the
+    mutants; None for a mutant that was not tested."""
     data = SourceFileMutationData(path=path)
     data.load()
     return data.exit_code_by_key
 
 
-def described(mutant, path):
-    """Where and what a mutant changes, as columns of the table; None where it is only
-    the text of a string."""
+def describe_mutant(mutant, path):
+    """Return the location and the change of a mutant as columns of the table; None if it
+    changes only the text of a string."""
     diff = get_diff_for_mutant(mutant, path=path).splitlines()[3:]
-    before, after = (
-        [line[1:].strip() for line in diff if line.startswith(sign)] for sign in "-+"
-    )
-    if _STRING.sub("", " ".join(before)) == _STRING.sub("", " ".join(after)):
+    removed = [line[1:].strip() for line in diff if line.startswith("-")]
+    added = [line[1:].strip() for line in diff if line.startswith("+")]
+    before = " ".join(removed)
+    after = " ".join(added)
+    if _STRING.sub("", before) == _STRING.sub("", after):
         return None
     name, owner = orig_function_and_class_names_from_key(mutant)
     source = path.read_text(encoding="utf-8")
     function = source.index(
         f"def {name}(", source.index(f"class {owner}") if owner else 0
     )
-    line = source.count("\n", 0, source.index(before[0], function)) + 1
+    line = source.count("\n", 0, source.index(removed[0], function)) + 1
     module = path.relative_to(PACKAGE)
-    where = {"room": module.parts[0], "module": module.as_posix(), "line": line}
-    what = {"function": f"{owner}.{name}" if owner else name, "mutant": mutant}
-    return where | what | {"before": " ".join(before), "after": " ".join(after)}
+    return {
+        "room": module.parts[0],
+        "module": module.as_posix(),
+        "line": line,
+        "function": f"{owner}.{name}" if owner else name,
+        "mutant": mutant,
+        "before": before,
+        "after": after,
+    }
 
 
 def draw(seed, size):
-    """Draw `size` mutants of each room without replacement: a table of one row a
+    """Draw `size` mutants of each package without replacement, as a table with one row a
     mutant."""
     rows = []
     for room in ROOMS:
         population = [
             (mutant, path)
             for path in sorted(PACKAGE.glob(f"{room}/**/*.py"))
-            for mutant in exit_codes(path)
+            for mutant in read_exit_codes(path)
         ]
         random.Random(f"{seed} {room}").shuffle(population)
-        rows += islice(
-            filter(None, (described(mutant, path) for mutant, path in population)), size
-        )
+        descriptions = (describe_mutant(mutant, path) for mutant, path in population)
+        rows += islice(filter(None, descriptions), size)
     return pd.DataFrame(rows)
 
 
 def run(mutants, room):
-    """Run mutants of one room against those tests of the room that cover them, the
-    quickest up to `SECONDS` together."""
+    """Test mutants of one package by the tests of the package that cover them, from the
+    fastest one on, up to `SECONDS` for a mutant."""
     config().pytest_add_cli_args_test_selection = [f"tests/{room}"]
     Path("mutants/mutmut-stats.json").unlink(missing_ok=True)
     durations = state().duration_by_test
@@ -131,9 +138,8 @@ def run(mutants, room):
     _run(mutants, max_children=1)
 
 
-def noticed_by_the_study(mutant):
-    """Whether the golden tables of the small study, made by the code with a mutant, are
-    others."""
+def is_detected_by_the_study(mutant):
+    """Return whether a mutant changes the golden tables of the small study."""
     command = [
         sys.executable,
         "-m",
@@ -155,23 +161,47 @@ def noticed_by_the_study(mutant):
     )
 
 
-def scores(sample):
-    """Share of mutants that the tests notice, with Wilson's 95 % interval, of each room
-    and of all."""
+def compute_scores(sample):
+    """Compute the share of mutants that the tests detect, with Wilson's 95 % interval, for
+    each package and for all."""
     rows = []
-    for room, part in [*sample.groupby("room", sort=False), ("all", sample)]:
-        noticed = part["status"].isin(["killed", "timeout"]).sum()
-        low, high = proportion_confint(noticed, len(part), method="wilson")
+    for room, mutants in [*sample.groupby("room", sort=False), ("all", sample)]:
+        detected = mutants["status"].isin(["killed", "timeout"]).sum()
+        low, high = proportion_confint(detected, len(mutants), method="wilson")
         counts = {
-            status: (part["status"] == status).sum()
+            status: (mutants["status"] == status).sum()
             for status in sample["status"].unique()
         }
         rows.append(
             {"room": room}
             | counts
-            | {"score": noticed / len(part), "low": low, "high": high}
+            | {"score": detected / len(mutants), "low": low, "high": high}
         )
     return pd.DataFrame(rows)
+
+
+def evaluate_mutants(room, mutants):
+    """Test the mutants of one package, and return their table with a column of
+    statuses."""
+    run(list(mutants["mutant"]), room)
+    codes = {}
+    for module in mutants["module"].unique():
+        codes |= read_exit_codes(PACKAGE / module)
+    statuses = [status_by_exit_code[codes[mutant]] for mutant in mutants["mutant"]]
+    mutants = mutants.assign(status=statuses)
+    if room == "study":
+        uncovered = mutants["mutant"][mutants["status"] == "no tests"]
+        if len(uncovered) and is_detected_by_the_study(""):
+            raise AssertionError(
+                "the golden tables of the small study are others without any mutant"
+            )
+        killed = [
+            index
+            for index, mutant in uncovered.items()
+            if is_detected_by_the_study(mutant)
+        ]
+        mutants.loc[killed, "status"] = "killed"
+    return mutants
 
 
 if __name__ == "__main__":
@@ -181,31 +211,8 @@ if __name__ == "__main__":
     sample = sample[sample["room"].isin(sys.argv[3:] or sample["room"])]
     copy_also_copy_files()
     setup_source_paths()
-    done = []
-    for room, part in sample.groupby("room", sort=False):
-        run(list(part["mutant"]), room)
-        codes = {
-            mutant: code
-            for module in part["module"].unique()
-            for mutant, code in exit_codes(PACKAGE / module).items()
-        }
-        part = part.assign(
-            status=[status_by_exit_code[codes[mutant]] for mutant in part["mutant"]]
-        )
-        if room == "study":
-            alone = part["mutant"][part["status"] == "no tests"]
-            if len(alone) and noticed_by_the_study(""):
-                raise AssertionError(
-                    "the golden tables of the small study are others without any mutant"
-                )
-            part.loc[
-                [
-                    place
-                    for place, mutant in alone.items()
-                    if noticed_by_the_study(mutant)
-                ],
-                "status",
-            ] = "killed"
-        done.append(part)
-        pd.concat(done).to_csv("reports/mutants.csv", index=False)
-    print(scores(pd.concat(done)).round(2).to_string(index=False))
+    tested = []
+    for room, mutants in sample.groupby("room", sort=False):
+        tested.append(evaluate_mutants(room, mutants))
+        pd.concat(tested).to_csv("reports/mutants.csv", index=False)
+    print(compute_scores(pd.concat(tested)).round(2).to_string(index=False))

@@ -121,6 +121,53 @@ def test_the_page_refers_to_no_file_but_the_report(written):
     assert "@import" not in text and "url(" not in text
 
 
+def check_stated_errors(page):
+    """Check that errors of fitted and of validation poses are stated separately."""
+    table = residual_table()
+    residuals_um = 1e6 * np.column_stack([table[f"before_d{axis}"] for axis in "xyz"])
+    for poses, held_out in (("fitted", False), ("validation", True)):
+        selected = residuals_um[table["held_out"] == held_out]
+        rms_um = np.sqrt((selected**2).sum(axis=1).mean())
+        stated = re.search(
+            rf"before .*?([\d.]+) µm \({poses}\)", page.inner_text("#scatter-words")
+        )
+        assert float(stated[1]) == pytest.approx(rms_um, rel=6e-3), poses
+
+
+def get_drawing(page, plot):
+    return page.evaluate(f"document.getElementById('{plot}').toDataURL()")
+
+
+def check_controls(page):
+    """Check that a key on each control changes a plot."""
+    for control, key, plot in (
+        ("shown", "ArrowDown", "robot"),
+        ("which", "ArrowDown", "robot"),
+        ("factor", "ArrowRight", "robot"),
+        ("pose", "ArrowLeft", "robot"),
+        ("robot", "ArrowUp", "robot"),
+        ("robot", "+", "robot"),
+        ("component", "ArrowDown", "scatter"),
+        ("against", "ArrowDown", "scatter"),
+        ("step", "ArrowDown", "scatter"),
+    ):
+        before = get_drawing(page, plot)
+        page.focus(f"#{control}")
+        page.keyboard.press(key)
+        assert get_drawing(page, plot) != before, control
+
+
+def check_buttons(page):
+    """Check that each button changes the robot's plot, and keeps a view in sight."""
+    for button in page.query_selector_all("button"):
+        before = get_drawing(page, "robot")
+        button.focus()
+        page.keyboard.press("Enter")
+        assert get_drawing(page, "robot") != before, button.inner_text()
+        if button.get_attribute("data-view"):
+            assert page.evaluate(ALL_IN_SIGHT)
+
+
 @pytest.mark.skipif(CHROMIUM is None, reason="Debian's chromium is not installed")
 @pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (390, "dark")])
 def test_in_a_browser_every_control_works_by_key_and_nothing_leaves_the_page(
@@ -153,46 +200,9 @@ def test_in_a_browser_every_control_works_by_key_and_nothing_leaves_the_page(
         assert papers[0] == papers[1] and (min(papers[0]) > 200) == (scheme == "light")
         assert page.evaluate(ALL_IN_SIGHT)
 
-        # Errors of fitted and of validation poses are stated separately.
-        table = residual_table()
-        for poses, held_out in (("fitted", False), ("validation", True)):
-            residual_um = (
-                1e6
-                * np.column_stack([table[f"before_d{axis}"] for axis in "xyz"])[
-                    table["held_out"] == held_out
-                ]
-            )
-            root = np.sqrt((residual_um**2).sum(axis=1).mean())
-            stated = re.search(
-                rf"before .*?([\d.]+) µm \({poses}\)", page.inner_text("#scatter-words")
-            )
-            assert float(stated[1]) == pytest.approx(root, rel=6e-3), poses
-
-        def drawn(plot):
-            return page.evaluate(f"document.getElementById('{plot}').toDataURL()")
-
-        for control, key, plot in (
-            ("shown", "ArrowDown", "robot"),
-            ("which", "ArrowDown", "robot"),
-            ("factor", "ArrowRight", "robot"),
-            ("pose", "ArrowLeft", "robot"),
-            ("robot", "ArrowUp", "robot"),
-            ("robot", "+", "robot"),
-            ("component", "ArrowDown", "scatter"),
-            ("against", "ArrowDown", "scatter"),
-            ("step", "ArrowDown", "scatter"),
-        ):
-            before = drawn(plot)
-            page.focus(f"#{control}")
-            page.keyboard.press(key)
-            assert drawn(plot) != before, control
-        for button in page.query_selector_all("button"):
-            before = drawn("robot")
-            button.focus()
-            page.keyboard.press("Enter")
-            assert drawn("robot") != before, button.inner_text()
-            if button.get_attribute("data-view"):
-                assert page.evaluate(ALL_IN_SIGHT)
+        check_stated_errors(page)
+        check_controls(page)
+        check_buttons(page)
         assert page.input_value("#pose") == page.evaluate("String(data.worst)")
         browser.close()
     assert faults == []

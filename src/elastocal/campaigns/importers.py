@@ -194,10 +194,10 @@ def _read_text(entry: Mapping[str, Any], path: str | Path) -> PublicMeasurements
         )
         joints = [name for name in entry["angles"] if name in table]
         angles = table[joints].to_numpy(float)
-        positions = {
-            target: 1e-3 * sum(table[columns].to_numpy(float) for columns in summands)
-            for target, summands in entry["positions"].items()
-        }
+        positions = {}
+        for target, summands in entry["positions"].items():
+            vectors_mm = [table[columns].to_numpy(float) for columns in summands]
+            positions[target] = 1e-3 * sum(vectors_mm)
         if euler_columns := entry.get("orientation"):
             euler_deg = table[euler_columns].to_numpy(float)
             rotation = scipy.spatial.transform.Rotation.from_euler(

@@ -48,6 +48,11 @@ class _UnclearError(yaml.MarkedYAMLError):
         self.allowed = allowed
 
 
+def _drop_dates(rules: list[tuple[str, Any]]) -> list[tuple[str, Any]]:
+    """Return implicit types of YAML, pairs of tag and pattern, without the date."""
+    return [rule for rule in rules if rule[0] != "tag:yaml.org,2002:timestamp"]
+
+
 # Use the safe loader in C if libyaml is installed, because every start of Snakemake reads
 # the configuration of the study.
 class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
@@ -55,12 +60,8 @@ class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[mi
     decimal."""
 
     yaml_implicit_resolvers: ClassVar = {
-        first: [
-            (tag, pattern)
-            for tag, pattern in resolvers
-            if tag != "tag:yaml.org,2002:timestamp"
-        ]
-        for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+        first: _drop_dates(rules)
+        for first, rules in yaml.SafeLoader.yaml_implicit_resolvers.items()
     }
 
     def construct_mapping(

@@ -124,8 +124,8 @@ def draw_mechanisms(table: pd.DataFrame) -> Figure:
             "No data set shows a mechanism of the catalogue with a probability of one"
             " half."
         )
-    totals = shown.groupby("mechanism")["share"].sum()
-    mechanisms = list(totals.sort_values(ascending=False).index)
+    shares = shown.groupby("mechanism")["share"].sum().sort_values(ascending=False)
+    mechanisms = list(shares.index)
     names = list(dict.fromkeys(table["data"]))
     figure, axes = create_panels(1, 1, 34 + 12 * len(mechanisms))
     axis = axes[0, 0]
@@ -144,14 +144,14 @@ def draw_mechanisms(table: pd.DataFrame) -> Figure:
         ec="#4d4d4d",
         zorder=3,
     )
-    for column, row, share, area in zip(
-        columns, rows, shown["share"], areas, strict=True
+    for centre, share, area in zip(
+        zip(columns, rows, strict=True), shown["share"], areas, strict=True
     ):
         if share >= _MIN_WRITTEN_SHARE:
             # Below its circle, so that no neighbour hides it.
             axis.annotate(
                 f"{100 * share:.0f} %",
-                (column, row),
+                centre,
                 (0.0, -0.5 * float(np.sqrt(area)) - 1.0),
                 textcoords="offset points",
                 ha="center",

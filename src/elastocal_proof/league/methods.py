@@ -340,5 +340,9 @@ def enter_league(job: Any) -> None:
             columns["fold"] = np.full(count, fold)
             columns["set"] = np.full(count, number)
             blocks.append(columns)
-    origin = describe_provenance(job.params, **job.wildcards)
-    write_table(job.output.entries, ENTRIES, blocks, origin)
+    write_table(
+        job.output.entries,
+        ENTRIES,
+        blocks,
+        describe_provenance(job.params, **job.wildcards),
+    )

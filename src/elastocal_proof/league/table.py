@@ -197,11 +197,11 @@ def format_league_page(
         best_rows = compared.groupby("data")["rms_mm"].idxmin()
         counts = compared.loc[best_rows, "method"].map(labels).value_counts()
         winners = ", ".join(f"{name} {count}" for name, count in counts.items())
-        sets = format_count(int(counts.sum()), "data set")
         errors = _pivot_methods(compared, ["data", "poses"], labels, _format_errors)
         paragraphs += [
             f"## {title}",
-            f"Smallest RMS error of {sets}: {winners}.",
+            f"Smallest RMS error of {format_count(int(counts.sum()), 'data set')}:"
+            f" {winners}.",
             format_collapsible(_ERRORS_TITLE, errors),
         ]
     stated = table.dropna(subset="covered")

@@ -15,6 +15,7 @@ from elastocal_proof.plant.laws import draw_direction, draw_sign
 from elastocal_proof.plant.simulated_robot import (
     Schedule,
     SimulatedRobot,
+    Tracker,
     compute_logged_temperature,
     open_simulation_stream,
     simulate_poses,
@@ -228,6 +229,26 @@ def add_blunders(
     draws
         Random numbers.
     """
+    rows = _draw_rows(table, kind, 2 if kind == "swapped" else count, draws)
+    sizes = _MIN_SIZE * (_MAX_SIZE / _MIN_SIZE) ** draws.random(len(rows))
+    wrong_table = {name: column.copy() for name, column in table.items()}
+    changed: list[tuple[int, ...]] = [(row,) for row in rows]
+    if kind == "joint_angle":
+        changed = _change_angles(wrong_table, robot, schedule, rows, sizes, draws)
+    elif kind == "load":
+        changed = _change_loads(wrong_table, robot, schedule, rows, sizes, draws)
+    else:
+        names = [name for name in _POSE_COLUMNS if name in table]
+        readings = np.array([table[name] for name in names])
+        _change_readings(readings, kind, rows, sizes, robot.tracker, draws)
+        wrong_table |= _name_columns(names, readings.T)
+    return wrong_table, [{"kind": kind, "rows": group} for group in changed]
+
+
+def _draw_rows(
+    table: Table, kind: str, count: int, draws: np.random.Generator
+) -> list[int]:
+    """Draw rows of different poses in which this kind of blunder is possible."""
     if kind == "load":
         eligible = np.flatnonzero(table["load"])
     else:
@@ -235,35 +256,33 @@ def add_blunders(
         eligible = np.arange(kind == "held_point", len(table["pose"]))
     shuffled = draws.permutation(eligible)
     first_of_pose = np.sort(np.unique(table["pose"][shuffled], return_index=True)[1])
-    count = 2 if kind == "swapped" else count
-    rows = sorted(shuffled[first_of_pose[:count]].tolist())
-    sizes = _MIN_SIZE * (_MAX_SIZE / _MIN_SIZE) ** draws.random(len(rows))
-    wrong_table = {name: column.copy() for name, column in table.items()}
-    if kind in ("joint_angle", "load"):
-        change = _change_angles if kind == "joint_angle" else _change_loads
-        changed = change(wrong_table, robot, schedule, rows, sizes, draws)
-        return wrong_table, [{"kind": kind, "rows": group} for group in changed]
-    names = [name for name in _POSE_COLUMNS if name in table]
-    readings = np.array([table[name] for name in names])
-    wrong = readings.copy()
+    return sorted(shuffled[first_of_pose[:count]].tolist())
+
+
+def _change_readings(
+    readings: np.ndarray,
+    kind: str,
+    rows: list[int],
+    sizes: np.ndarray,
+    tracker: Tracker,
+    draws: np.random.Generator,
+) -> None:
+    """Make readings (columns, rows) of the tracker wrong in place."""
     if kind == "zeros":
-        wrong[:, rows] = 0.0
+        readings[:, rows] = 0.0
     elif kind == "held_point":
-        wrong[:, rows] = readings[:, np.array(rows) - 1]
+        readings[:, rows] = readings[:, np.array(rows) - 1]
     elif kind == "swapped":
-        wrong[:, rows] = readings[:, rows[::-1]]
+        readings[:, rows] = readings[:, rows[::-1]]
     elif kind == "position":
         for row, size in zip(rows, sizes, strict=True):
-            wrong[:3, row] += size * robot.tracker.sigma_m * draw_direction(draws)
+            readings[:3, row] += size * tracker.sigma_m * draw_direction(draws)
     else:
         for row, size in zip(rows, sizes, strict=True):
-            angle = min(size * robot.tracker.sigma_rad, np.pi)
+            angle = min(size * tracker.sigma_rad, np.pi)
             turn = to_rotation_matrix(angle * draw_direction(draws))
-            wrong[3:, row] = to_rotation_vector(
-                turn @ to_rotation_matrix(readings[3:, row])
-            )
-    wrong_table |= _name_columns(names, wrong.T)
-    return wrong_table, [{"kind": kind, "rows": (row,)} for row in rows]
+            rotation = turn @ to_rotation_matrix(readings[3:, row])
+            readings[3:, row] = to_rotation_vector(rotation)
 
 
 def _observe_rows(
