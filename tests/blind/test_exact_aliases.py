@@ -1,5 +1,5 @@
 """The aliases that the scores set aside are exact on the design of the blind cases, and
-no others are."""
+there are no others."""
 
 import numpy as np
 import pytest
@@ -17,43 +17,47 @@ from elastocal_proof.blind.scores import EXACT_ALIASES
 
 pytestmark = pytest.mark.slow
 
+# Largest sine of an angle between two spans that are the same.
 _SINE = 1e-6
+# Singular values below this are rounding errors.
 _ROUNDING = 1e-7
 
 
-def directions(declared, observations, candidates):
-    """Orthonormal bases of what each candidate contributes beyond the declared model,
-    whitened; without a column, nothing."""
-    line = linearize(
+def compute_bases(declared, observations, candidates):
+    """Compute an orthonormal basis of the whitened columns of each candidate, after
+    their projection off the declared model; it is empty if nothing remains."""
+    linear = linearize(
         declared.model, declared.estimate, observations, declared.conditions
     )
-    left = declared.whiten(line.sensitivities).reshape(line.residual.size, -1)
-    basis = np.linalg.qr(left / np.linalg.norm(left, axis=0))[0]
-    found = []
+    rows = linear.residual.size
+    declared_columns = declared.whiten(linear.sensitivities).reshape(rows, -1)
+    declared_columns = declared_columns / np.linalg.norm(declared_columns, axis=0)
+    declared_basis = np.linalg.qr(declared_columns)[0]
+    bases = []
     for candidate in candidates:
-        made = compute_effect_sensitivities(
+        sensitivities = compute_effect_sensitivities(
             [(candidate.displacement, ())],
-            line.conditions,
-            line.coordinate_jacobian,
+            linear.conditions,
+            linear.coordinate_jacobian,
             observations.state,
         )
-        columns = declared.whiten(made).reshape(line.residual.size, -1)
+        columns = declared.whiten(sensitivities).reshape(rows, -1)
         columns = columns / np.linalg.norm(columns, axis=0)
+        # The second projection removes the rounding errors of the first.
         for _ in range(2):
-            columns = columns - basis @ (basis.T @ columns)
-        turned, sizes, _ = np.linalg.svd(columns, full_matrices=False)
-        found.append((candidate, turned[:, sizes > _ROUNDING]))
-    return found
+            columns = columns - declared_basis @ (declared_basis.T @ columns)
+        left, singular_values, _ = np.linalg.svd(columns, full_matrices=False)
+        bases.append(left[:, singular_values > _ROUNDING])
+    return bases
 
 
 @pytest.fixture(scope="module", params=["fanuc", "abb"])
-def seen(request, tmp_path_factory):
-    """What every candidate makes of the measurements of a robot without an effect, off
-    the declared model."""
+def candidates_and_bases(request, tmp_path_factory):
+    """Candidates without shapes, and their bases on a robot without an effect."""
     folder = tmp_path_factory.mktemp(request.param)
-    # Of an arm whose file tells no weights: where it does, weights absorb some of what
-    # is compared here.
-    made = BlindCase(
+    # The robot file declares no weights, because weights would absorb a part of the
+    # columns that are compared.
+    blind_case = BlindCase(
         "aliases",
         "none",
         request.param,
@@ -63,33 +67,45 @@ def seen(request, tmp_path_factory):
         314159,
         changes={"weighs": False},
     )
-    write_sealed_case(made, folder / "blind", folder / "sealed", ROBOTS)
+    write_sealed_case(blind_case, folder / "blind", folder / "sealed", ROBOTS)
     descriptions, training, _ = load_campaign(
-        read_campaign_folder(folder / "blind" / made.name, ROBOTS)
+        read_campaign_folder(folder / "blind" / blind_case.name, ROBOTS)
     )
     case = build_case(descriptions, tabulate_measurements(training))
     declared = fit_model(case.model, case.observations, estimate_noise(case)[0])
-    candidates = [c for c in case.candidates.values() if not c.shapes]
-    return directions(declared, case.observations, candidates)
+    candidates = [
+        candidate for candidate in case.candidates.values() if not candidate.shapes
+    ]
+    return candidates, compute_bases(declared, case.observations, candidates)
 
 
-def test_effects_with_the_same_span_are_those_set_aside_and_compliances_take_up_a_wrong_force_scale(
-    seen,
-):
-    same = set()
-    for one, columns in seen:
-        for other, others in seen:
-            within = (
-                columns.shape[1]
-                and np.linalg.norm(columns - others @ (others.T @ columns), 2) < _SINE
-            )
-            if one.effect != other.effect and within and columns.shape == others.shape:
-                same.add(((one.effect, one.joints), other.effect))
-    told = {
-        (place, other)
-        for place, other in EXACT_ALIASES.items()
-        if place[0] not in ("force_scale", "link_weight")
+def is_same_span(basis, other_basis):
+    """Check whether two orthonormal bases span the same space, which is not empty."""
+    if not basis.size or basis.shape != other_basis.shape:
+        return False
+    residual = basis - other_basis @ (other_basis.T @ basis)
+    return np.linalg.norm(residual, 2) < _SINE
+
+
+def test_effects_with_the_same_span_are_the_aliases_of_the_scores(candidates_and_bases):
+    same_spans = set()
+    for candidate, basis in zip(*candidates_and_bases, strict=True):
+        for alias, alias_basis in zip(*candidates_and_bases, strict=True):
+            if candidate.effect != alias.effect and is_same_span(basis, alias_basis):
+                same_spans.add(((candidate.effect, candidate.joints), alias.effect))
+    expected = {
+        (located_effect, alias)
+        for located_effect, alias in EXACT_ALIASES.items()
+        if located_effect[0] not in ("force_scale", "link_weight")
     }
-    assert same == told
-    columns = [part for candidate, part in seen if candidate.effect == "force_scale"]
-    assert columns and not sum(part.shape[1] for part in columns)
+    assert same_spans == expected
+
+
+def test_compliances_absorb_a_wrong_force_scale(candidates_and_bases):
+    force_scale_bases = [
+        basis
+        for candidate, basis in zip(*candidates_and_bases, strict=True)
+        if candidate.effect == "force_scale"
+    ]
+    assert force_scale_bases
+    assert not any(basis.size for basis in force_scale_bases)

@@ -1,17 +1,16 @@
-"""A verdict is counted for what it is worth: its words, its errors, its probabilities
-and its intervals."""
+"""Scores of a verdict: its names, its errors, its probabilities and its intervals."""
 
 import numpy as np
 import pytest
 from made_blind_documents import (
     PLAN,
-    effect,
-    frame,
-    oracle,
-    said,
-    silence,
-    truth,
-    verdict,
+    make_adequate_verdict,
+    make_effect,
+    make_oracle,
+    make_plain_verdict,
+    make_truth,
+    make_verdict,
+    tabulate_cases,
 )
 
 from elastocal_proof.blind.scores import (
@@ -22,62 +21,83 @@ from elastocal_proof.blind.scores import (
 )
 
 TILTED = {"misplaced": {"shift_m": [0.0, 0.0, 2e-4], "turn_rad": [3e-4, 0.0, 0.0]}}
-PAYLOAD = truth(("payload",))
-NOTHING = truth()
-PAIR = truth(("payload",), ("joint_tilt", 2), group="pair")
+PAYLOAD = make_truth(("payload",))
+NOTHING = make_truth()
+PAIR = make_truth(("payload",), ("joint_tilt", 2), group="pair")
 COUNTED = ("detected", "exact", "named_right", "holds_truth", "wrong_name", "remains")
 RIGHT = {"detected", "exact", "named_right", "holds_truth"}
+# Truth, verdict, and the columns that are true.
 OUTCOMES = {
-    "a base that is misplaced": (
-        truth(group="setting") | TILTED,
-        said("named", "base_placement"),
+    "a misplaced base is named": (
+        make_truth(group="setting") | TILTED,
+        make_plain_verdict("named", "base_placement"),
         set(),
     ),
-    "a base that is not": (
+    "a correct base is named": (
         NOTHING,
-        said("named", "base_placement"),
+        make_plain_verdict("named", "base_placement"),
         {"detected", "wrong_name"},
     ),
-    "another name beside it": (
+    "a wrong name besides the misplaced base": (
         NOTHING | TILTED,
-        said("several", "base_placement", "payload"),
+        make_plain_verdict("several", "base_placement", "payload"),
         {"detected", "wrong_name"},
     ),
-    "right name beside it": (
+    "the right name besides the misplaced base": (
         PAYLOAD | TILTED,
-        said("several", "base_placement", "payload"),
+        make_plain_verdict("several", "base_placement", "payload"),
         RIGHT,
     ),
-    "right name": (PAYLOAD, said("named", "payload"), RIGHT),
-    "wrong name": (PAYLOAD, said("named", "link_weight"), {"detected", "wrong_name"}),
-    "class that holds it": (
+    "the right name": (PAYLOAD, make_plain_verdict("named", "payload"), RIGHT),
+    "a wrong name": (
         PAYLOAD,
-        said("class", "link_weight", alternatives=["payload"]),
+        make_plain_verdict("named", "link_weight"),
+        {"detected", "wrong_name"},
+    ),
+    "a class with the truth": (
+        PAYLOAD,
+        make_plain_verdict("class", "link_weight", alternatives=["payload"]),
         {"detected", "holds_truth"},
     ),
-    "variant": (
-        truth(("force_bias",)),
-        said("class", "payload", alternatives=["force_bias[base axes]"]),
+    "a class with a variant of the truth": (
+        make_truth(("force_bias",)),
+        make_plain_verdict("class", "payload", alternatives=["force_bias[base axes]"]),
         {"detected", "holds_truth"},
     ),
-    "missed": (PAYLOAD, said("adequate"), set()),
-    "silence where nothing is": (NOTHING, said("adequate"), set()),
-    "false alarm": (NOTHING, said("named", "payload"), {"detected", "wrong_name"}),
-    "one of two": (PAIR, said("named", "payload"), {"detected", "wrong_name"}),
-    "both of two": (
+    "a missed effect": (PAYLOAD, make_plain_verdict("adequate"), set()),
+    "nothing is missing and nothing is reported": (
+        NOTHING,
+        make_plain_verdict("adequate"),
+        set(),
+    ),
+    "a false alarm": (
+        NOTHING,
+        make_plain_verdict("named", "payload"),
+        {"detected", "wrong_name"},
+    ),
+    "one of two effects": (
         PAIR,
-        said("several", "joint_tilt", "payload"),
+        make_plain_verdict("named", "payload"),
+        {"detected", "wrong_name"},
+    ),
+    "both of two effects": (
+        PAIR,
+        make_plain_verdict("several", "joint_tilt", "payload"),
         {"detected", "exact", "holds_truth"},
     ),
-    "one that is not there": (
+    "a second name that is wrong": (
         PAYLOAD,
-        said("several", "payload", "link_weight"),
+        make_plain_verdict("several", "payload", "link_weight"),
         {"detected"},
     ),
-    "not enough": (PAYLOAD, said("unexplained", "payload"), {"detected"}),
-    "two classes that hold both": (
+    "an unexplained residual": (
+        PAYLOAD,
+        make_plain_verdict("unexplained", "payload"),
+        {"detected"},
+    ),
+    "two classes with both effects": (
         PAIR,
-        said(
+        make_plain_verdict(
             "several",
             "link_weight",
             "payload",
@@ -85,19 +105,21 @@ OUTCOMES = {
         ),
         {"detected", "holds_truth"},
     ),
-    "two that hold one": (
+    "two classes with one of two effects": (
         PAIR,
-        said("several", "link_weight", "link_geometry", alternatives=["payload"]),
+        make_plain_verdict(
+            "several", "link_weight", "link_geometry", alternatives=["payload"]
+        ),
         {"detected"},
     ),
 }
 
 
-@pytest.mark.parametrize("name", OUTCOMES)
-def test_outcome_is(name):
-    sealed, found, expected = OUTCOMES[name]
-    row = build_case_row(PLAN, sealed, found)
-    assert {key for key in COUNTED if row[key] is True} == expected
+@pytest.mark.parametrize("outcome", OUTCOMES)
+def test_a_verdict_is_counted_in_the_right_columns(outcome):
+    truth, verdict, expected = OUTCOMES[outcome]
+    row = build_case_row(PLAN, truth, verdict)
+    assert {column for column in COUNTED if row[column] is True} == expected
 
 
 @pytest.mark.parametrize(
@@ -108,84 +130,84 @@ def test_outcome_is(name):
         ((-0.14, -0.06), False, (True, False)),
     ],
 )
-def test_worse_is_beyond_two_standard_errors_and_counts_where_something_was_adopted(
+def test_errors_are_worse_if_they_grow_by_more_than_two_standard_errors(
     reduction, adopted, expected
 ):
-    found = verdict(
+    verdict = make_verdict(
         "named",
-        effect("payload", adopted=adopted),
+        make_effect("payload", adopted=adopted),
         before=1e-4,
         after=1.1e-4,
         reduction=reduction,
     )
-    row = build_case_row(PLAN, PAYLOAD, found, oracle())
+    row = build_case_row(PLAN, PAYLOAD, verdict, make_oracle())
     assert (row["worse"], row["adopted"]) == expected
 
 
-def test_exact_aliases_are_told_by_the_truth_its_joints_and_the_robot():
-    places = [
-        ("transmission_harmonic", 2),
-        ("transmission_harmonic", 3),
-        ("link_weight", 2),
-        ("link_weight", 2, 3),
-    ]
-    assert frame(
-        *((truth(place), silence(), oracle()) for place in places)
-    ).exact_alias.tolist() == [True, False, True, False]
-    # An arm that has no compensator has no alias of it.
-    assert not build_case_row(
-        PLAN, truth(places[0], robot="gen3"), silence(), oracle()
-    )["exact_alias"]
+@pytest.mark.parametrize(
+    ("located_effect", "expected"),
+    [
+        (("transmission_harmonic", 2), True),
+        (("transmission_harmonic", 3), False),
+        (("link_weight", 2), True),
+        (("link_weight", 2, 3), False),
+    ],
+)
+def test_an_exact_alias_follows_from_the_effect_and_its_joints(
+    located_effect, expected
+):
+    entry = (make_truth(located_effect), make_adequate_verdict(), make_oracle())
+    assert tabulate_cases(entry).exact_alias.tolist() == [expected]
 
 
-def test_a_fault_of_the_data_that_ended_a_diagnosis_has_no_errors_and_states_nothing():
-    row = build_case_row(
-        PLAN, PAYLOAD, verdict("named", effect("wrong_unit")) | {"heldout": None}, None
-    )
-    assert (
-        np.isnan(row["after_rms_m"])
-        and not row["worse"]
-        and np.isnan(row["stated"])
-        and np.isnan(row["oracle_rms_m"])
-    )
+def test_an_arm_without_a_compensator_has_no_alias_of_it():
+    truth = make_truth(("transmission_harmonic", 2), robot="gen3")
+    row = build_case_row(PLAN, truth, make_adequate_verdict(), make_oracle())
+    assert not row["exact_alias"]
 
 
-FOREIGN = truth(("outside:refraction",), group="outside")
-ABSORBED = truth(("force_scale",))
+def test_a_verdict_that_a_fault_of_the_data_ended_has_no_errors_and_states_nothing():
+    verdict = make_verdict("named", make_effect("wrong_unit")) | {"heldout": None}
+    row = build_case_row(PLAN, PAYLOAD, verdict, None)
+    assert not row["worse"]
+    for column in ("after_rms_m", "stated", "oracle_rms_m"):
+        assert np.isnan(row[column])
+
+
+OUTSIDE = make_truth(("outside:refraction",), group="outside")
+ABSORBED = make_truth(("force_scale",))
 ABSORBED["defects"][0]["of"] = "raw"
+TWO_OFFSETS = make_truth(
+    ("joint_offset", 2), ("joint_offset", 4), group="several_joints"
+)
 
 
 @pytest.mark.parametrize(
-    ("document", "mechanisms", "so"),
+    ("truth", "mechanisms", "expected"),
     [
         (PAYLOAD, ("payload",), True),
         (PAYLOAD, ("payload", "joint_tilt"), False),
-        # A related mechanism is not that one.
+        # A related mechanism besides the right one is wrong.
         (PAYLOAD, ("payload", "other"), False),
         (PAYLOAD, (), False),
         (NOTHING, (), True),
         (NOTHING, ("other",), False),
-        (FOREIGN, ("payload", "other"), True),
-        (FOREIGN, ("payload",), False),
+        # Outside of the catalogue every set with "other" is true.
+        (OUTSIDE, ("payload", "other"), True),
+        (OUTSIDE, ("payload",), False),
         (PAIR, ("joint_tilt", "payload"), True),
         (NOTHING | TILTED, ("base_placement",), True),
-        (
-            truth(("joint_offset", 2), ("joint_offset", 4), group="several_joints"),
-            ("joint_offset",),
-            True,
-        ),
+        (TWO_OFFSETS, ("joint_offset",), True),
         (ABSORBED, (), True),
         (ABSORBED, ("force_scale",), False),
     ],
 )
-def test_true_is_the_exact_set_of_mechanisms_and_outside_of_the_catalogue_every_set_with_other(
-    document, mechanisms, so
-):
-    assert is_true(mechanisms, document) == so
+def test_only_the_exact_set_of_mechanisms_is_true(truth, mechanisms, expected):
+    assert is_true(mechanisms, truth) == expected
 
 
 @pytest.mark.parametrize(
-    ("shares", "place", "held"),
+    ("probabilities", "rank", "expected"),
     [
         ((0.6, 0.3, 0.06, 0.04), 2, True),
         ((0.6, 0.3, 0.06, 0.04), 3, False),
@@ -193,63 +215,63 @@ def test_true_is_the_exact_set_of_mechanisms_and_outside_of_the_catalogue_every_
         ((0.97, 0.03), 1, False),
     ],
 )
-def test_the_credible_set_is_the_smallest_that_reaches_95_per_cent(shares, place, held):
+def test_the_credible_set_is_the_smallest_that_reaches_95_per_cent(
+    probabilities, rank, expected
+):
+    """The true mechanism has the given rank among the hypotheses."""
     names = ["a", "b", "c", "d"]
-    names[place] = "payload"
+    names[rank] = "payload"
     sets = [
-        {"mechanisms": [name], "probability": share}
-        for name, share in zip(names, shares, strict=False)
+        {"mechanisms": [name], "probability": probability}
+        for name, probability in zip(names, probabilities, strict=False)
     ]
-    found = score_probabilities(PAYLOAD, {"probabilities": {"sets": sets[::-1]}})
-    assert (found["held"], found["stated"], found["correct"]) == (
-        held,
-        max(shares),
-        False,
-    )
+    scored = score_probabilities(PAYLOAD, {"probabilities": {"sets": sets[::-1]}})
+    assert scored["held"] == expected
+    assert scored["stated"] == max(probabilities)
+    assert scored["correct"] is False
 
 
-def of_effect(document, found):
-    return [
-        row
-        for row in list_intervals(document, found)
-        if row["effect"] != "joint_compliance"
-    ]
+OFFSET_RAD = 3e-4
+OFFSET = make_truth(("joint_offset", 3))
+OFFSET["defects"][0]["parameters"] = {"offset": OFFSET_RAD}
 
 
-def with_parameters(document, *values):
-    for defect, value in zip(document["defects"], values, strict=True):
-        defect["parameters"] = {"offset": value}
-    return document
+def list_effect_intervals(effect, **facts):
+    """List the intervals of a verdict on `OFFSET` with one effect, without those of the
+    compliances."""
+    intervals = list_intervals(OFFSET, make_verdict("named", effect, **facts))
+    return [row for row in intervals if row["effect"] != "joint_compliance"]
 
 
-def test_an_interval_holds_what_lies_within_two_standard_errors_of_the_right_effect_at_the_right_joint():
-    offset = with_parameters(truth(("joint_offset", 3)), 3e-4)
-    for value, holds in (
-        (3.19e-4, True),
-        (3.21e-4, False),
-        (2.81e-4, True),
-        (2.79e-4, False),
-    ):
-        (row,) = of_effect(
-            offset,
-            verdict(
-                "named", effect("joint_offset", 3, parameters=[("offset", value, 1e-5)])
-            ),
-        )
-        assert row["holds"] == holds
-    there = [("offset", 3e-4, 1e-5)]
-    assert not of_effect(offset, verdict("named", effect("link_geometry", 3)))
-    assert not of_effect(
-        offset, verdict("named", effect("joint_offset", 4, parameters=there))
-    )
-    assert not of_effect(
-        offset,
-        verdict("named", effect("joint_offset", 3, parameters=[("offset", 0.0, 0.0)])),
-    )
-    # Student's t is wider where the noise has few degrees of freedom.
-    few = verdict(
-        "named",
-        effect("joint_offset", 3, parameters=[("offset", 3.3e-4, 1e-5)]),
-        freedom=3,
-    )
-    assert of_effect(offset, few)[0]["holds"]
+def make_offset(joint, value_rad, std_error_rad):
+    parameters = [("offset", value_rad, std_error_rad)]
+    return make_effect("joint_offset", joint, parameters=parameters)
+
+
+@pytest.mark.parametrize(
+    ("value_rad", "expected"),
+    [(3.19e-4, True), (3.21e-4, False), (2.81e-4, True), (2.79e-4, False)],
+)
+def test_an_interval_holds_a_true_value_within_two_standard_errors(value_rad, expected):
+    [interval] = list_effect_intervals(make_offset(3, value_rad, 1e-5))
+    assert interval["holds"] == expected
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        make_effect("link_geometry", 3),
+        make_offset(4, OFFSET_RAD, 1e-5),
+        # A parameter without a standard error was not identified.
+        make_offset(3, 0.0, 0.0),
+    ],
+)
+def test_only_identified_parameters_of_the_right_effect_and_joint_have_an_interval(
+    effect,
+):
+    assert not list_effect_intervals(effect)
+
+
+def test_an_interval_is_wider_if_the_noise_has_few_degrees_of_freedom():
+    [interval] = list_effect_intervals(make_offset(3, 3.3e-4, 1e-5), freedom=3)
+    assert interval["holds"]

@@ -1,109 +1,114 @@
-"""Every figure beside its target, over every case that belongs to it and no other; and
-the tables of the pictures."""
+"""Figures of the blind benchmark: each counts the cases that belong to it and no
+others, and is compared with its target."""
 
 import pytest
-from made_blind_documents import effect, oracle, said, silence, summary, truth, verdict
+from made_blind_documents import (
+    make_adequate_verdict,
+    make_effect,
+    make_oracle,
+    make_plain_verdict,
+    make_truth,
+    make_verdict,
+    summarize_entries,
+)
 from scipy.stats import beta
 
-PAYLOAD = said("named", "payload")
-ONE = truth(("payload",))
+PAYLOAD = make_plain_verdict("named", "payload")
+PAYLOAD_TRUTH = make_truth(("payload",))
+DETECTED = (PAYLOAD_TRUTH, PAYLOAD, make_oracle())
+MISSED = (PAYLOAD_TRUTH, make_adequate_verdict(), make_oracle())
+# A case without an effect, and a verdict without one.
+SILENT = (make_truth(), make_adequate_verdict(), make_oracle(1.0))
 
 
-def test_rates_have_clopper_pearson_intervals_and_are_held_against_their_targets():
-    entries = [(ONE, PAYLOAD, oracle())] * 7 + [(ONE, silence(), oracle())] * 3
-    row = summary(*entries).loc[("proof", "detected at 50")]
-    assert (row.hits, row.cases, row.rate, row.target, row.holds) == (
-        7,
-        10,
-        0.7,
-        "at least 98 %",
-        False,
-    )
-    assert row.low == pytest.approx(
-        beta.ppf(0.025, 7, 4)
-    ) and row.high == pytest.approx(beta.ppf(0.975, 8, 3))
-    assert summary(*entries[:7]).loc[("proof", "detected at 50")].holds
-    # At other levels there is no target.
-    other = summary((truth(("payload",), level=25.0), PAYLOAD, oracle())).loc[
-        ("proof", "detected at 25")
+def test_a_rate_has_a_clopper_pearson_interval_and_is_compared_with_its_target():
+    summary = summarize_entries(*[DETECTED] * 7, *[MISSED] * 3)
+    row = summary.loc[("proof", "detected at 50")]
+    assert (row.hits, row.cases, row.rate) == (7, 10, 0.7)
+    assert row.target == "at least 98 %"
+    assert row.holds is False
+    assert row.low == pytest.approx(beta.ppf(0.025, 7, 4))
+    assert row.high == pytest.approx(beta.ppf(0.975, 8, 3))
+    without_misses = summarize_entries(*[DETECTED] * 7)
+    assert without_misses.loc[("proof", "detected at 50")].holds
+
+
+def test_a_level_that_the_plan_does_not_judge_has_no_target():
+    truth = make_truth(("payload",), level=25.0)
+    summary = summarize_entries((truth, PAYLOAD, make_oracle()))
+    row = summary.loc[("proof", "detected at 25")]
+    assert row.target == ""
+    assert row.holds is None
+
+
+def test_the_plan_has_a_target_for_each_figure_of_the_benchmark():
+    levels = [
+        ("single", 25.0),
+        ("single", 50.0),
+        ("single", 200.0),
+        ("pair", 50.0),
+        ("pair", 200.0),
+        ("outside", 200.0),
+        ("several_joints", 200.0),
+        ("gear_gravity", 200.0),
     ]
-    assert (other.target, other.holds) == ("", None)
-
-
-def test_the_plan_has_a_target_for_each_of_the_figures_of_the_proof():
-    groups = {
-        "single": 25.0,
-        "pair": 50.0,
-        "outside": 200.0,
-        "several_joints": 200.0,
-        "gear_gravity": 200.0,
-    }
     entries = [
-        (truth(("payload",), group=group, level=level), PAYLOAD, oracle())
-        for group, level in groups.items()
+        (make_truth(("payload",), group=group, level=level), PAYLOAD, make_oracle())
+        for group, level in levels
     ]
-    entries += [
-        (truth(("payload",), group=group, level=200.0), PAYLOAD, oracle())
-        for group in ("single", "pair")
-    ]
-    entries += [(truth(("payload",), level=50.0), PAYLOAD, oracle())]
-    table = summary(*entries, (truth(), silence(), oracle(1.0)))
-    assert (table.target != "").sum() == 32
+    summary = summarize_entries(*entries, SILENT)
+    assert (summary.target != "").sum() == 32
 
 
-def test_false_alarms_are_held_against_their_upper_limit_and_hard_settings_are_apart():
-    hard = (truth(group="setting", setting="force_3kN"), PAYLOAD, oracle(1.0))
-    few = summary(*[(truth(), silence(), oracle(1.0))] * 20, hard).loc["proof"]
-    row = few.loc["false alarms with no effect"]
-    assert (row.hits, row.cases, row.holds) == (0, 20, False)
-    assert (
-        few.loc["false alarms, 3 kN"].hits,
-        few.loc["false alarms, twelve poses"].cases,
-    ) == (1, 0)
-    many = summary(*[(truth(), silence(), oracle(1.0))] * 100, hard)
-    assert many.loc[("proof", "false alarms with no effect")].holds
+def test_false_alarms_need_a_low_upper_limit_and_hard_settings_are_counted_apart():
+    hard_truth = make_truth(group="setting", setting="force_3kN")
+    hard = (hard_truth, PAYLOAD, make_oracle(1.0))
+    of_few_cases = summarize_entries(*[SILENT] * 20, hard).loc["proof"]
+    row = of_few_cases.loc["false alarms with no effect"]
+    assert (row.hits, row.cases) == (0, 20)
+    assert row.holds is False
+    assert of_few_cases.loc["false alarms, 3 kN"].hits == 1
+    assert of_few_cases.loc["false alarms, twelve poses"].cases == 0
+    of_many_cases = summarize_entries(*[SILENT] * 100, hard)
+    assert of_many_cases.loc[("proof", "false alarms with no effect")].holds
 
 
 @pytest.mark.parametrize(
     ("right", "holds"), [(36, True), (35, True), (34, False), (20, False)]
 )
-def test_pairs_are_held_against_what_the_best_analyst_finds_of_the_same_cases(
-    right, holds
-):
-    """34 of 36 are 94.4 %; cases for which the limit was not worked out take no
-    part."""
-    pair = truth(("payload",), ("joint_tilt", 2), group="pair", level=200.0)
-    both = verdict("several", effect("payload"), effect("joint_tilt", 2))
-    found = [both] * right + [PAYLOAD] * (40 - right)
-    best = [{"detected": True, "right": number < 36} for number in range(40)]
+def test_pairs_are_compared_with_the_best_analyst_on_the_same_cases(right, holds):
+    """34 of 36 are 94.4 %; cases without a best analyst are not counted."""
+    truth = make_truth(("payload",), ("joint_tilt", 2), group="pair", level=200.0)
+    both = make_verdict("several", make_effect("payload"), make_effect("joint_tilt", 2))
+    verdicts = [both] * right + [PAYLOAD] * (40 - right)
     sampled = [
-        (pair, one, oracle(), limit) for one, limit in zip(found, best, strict=True)
+        (truth, verdict, make_oracle(), {"detected": True, "right": number < 36})
+        for number, verdict in enumerate(verdicts)
     ]
-    table = summary(*sampled, *[(pair, PAYLOAD, oracle())] * 50).loc["proof"]
-    row = table.loc[
-        "both of two effects at 200 each, over the best analyst's, on the same cases"
-    ]
-    assert (
-        row.cases == 40 and row.rate == pytest.approx(right / 36) and row.holds == holds
-    )
-    assert row.low < row.rate < row.high or right == 36
-    assert table.loc["both of two effects at 200 each, by the best analyst"].hits == 36
+    not_sampled = [(truth, PAYLOAD, make_oracle())] * 50
+    table = summarize_entries(*sampled, *not_sampled).loc["proof"]
+    quantity = "both of two effects at 200 each"
+    ratio = table.loc[f"{quantity}, over the best analyst's, on the same cases"]
+    assert ratio.cases == 40
+    assert ratio.rate == pytest.approx(right / 36)
+    assert ratio.holds == holds
+    assert ratio.low < ratio.rate < ratio.high or right == 36
+    assert table.loc[f"{quantity}, by the best analyst"].hits == 36
 
 
-def test_that_something_remains_is_held_against_where_it_does_and_where_nothing_does():
-    remaining = {"repeatable": {"remains": True}}
-    left = truth(("outside:two_angles", 3), group="remains", level=1e4)
-    entries = [(left, PAYLOAD | remaining, None)] * 19 + [
-        (left, PAYLOAD, None),
-        (truth(), silence() | remaining, oracle(1.0)),
-    ]
-    table = summary(
-        *entries,
-        *[(truth(group="setting", setting="force_3kN"), silence(), oracle(1.0))] * 30,
+def test_a_reported_residual_is_counted_where_there_is_one_and_where_there_is_none():
+    reported = {"repeatable": {"remains": True}}
+    remaining = make_truth(("outside:two_angles", 3), group="remains", level=1e4)
+    hard = make_truth(group="setting", setting="force_3kN")
+    table = summarize_entries(
+        *[(remaining, PAYLOAD | reported, None)] * 19,
+        (remaining, PAYLOAD, None),
+        (make_truth(), make_adequate_verdict() | reported, make_oracle(1.0)),
+        *[(hard, make_adequate_verdict(), make_oracle(1.0))] * 30,
     ).loc["proof"]
-    said, falsely = (
-        table.loc[f"said to remain, where {words}"]
-        for words in ("something repeatable does", "nothing does, all settings")
-    )
-    assert (said.hits, said.cases, said.holds) == (19, 20, True)
-    assert (falsely.hits, falsely.cases, falsely.holds) == (1, 31, False)
+    hits = table.loc["said to remain, where something repeatable does"]
+    assert (hits.hits, hits.cases) == (19, 20)
+    assert hits.holds
+    false_alarms = table.loc["said to remain, where nothing does, all settings"]
+    assert (false_alarms.hits, false_alarms.cases) == (1, 31)
+    assert false_alarms.holds is False

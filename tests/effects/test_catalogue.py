@@ -1,5 +1,5 @@
-"""The catalogue as a whole: what is in it, on any chain, and that a function in a
-module is all that a new effect takes."""
+"""The catalogue as a whole: its contents, its candidates on any chain, and a new effect as
+one module."""
 
 import re
 import sys
@@ -53,19 +53,21 @@ def chain(request, fanuc):
     )
 
 
-def test_laws_that_are_fixed_are_the_same_under_other_loads_and_springs_and_at_other_places(
+def test_fixed_laws_depend_on_joint_angles_alone(
     chain,
 ):
     joints = equipped(chain).joints
     states = make_states(joints, 5, seed=1)
     elsewhere = make_states(joints, 5, seed=2)
-    one = conditions_on(chain, states)
-    other = replace(
-        conditions_on(chain, elsewhere, 2 * one.compliance),
-        joint_angles=one.joint_angles,
+    unchanged = conditions_on(chain, states)
+    changed = replace(
+        conditions_on(chain, elsewhere, 2 * unchanged.compliance),
+        joint_angles=unchanged.joint_angles,
     )
     fixed = [
-        candidate for candidate in candidates_on(one.sites).values() if candidate.fixed
+        candidate
+        for candidate in candidates_on(unchanged.sites).values()
+        if candidate.fixed
     ]
     assert {candidate.effect for candidate in fixed} >= {
         "transmission_harmonic",
@@ -74,15 +76,17 @@ def test_laws_that_are_fixed_are_the_same_under_other_loads_and_springs_and_at_o
     }
     for candidate in fixed:
         for law, again in zip(
-            candidate.displacement(one), candidate.displacement(other), strict=True
+            candidate.displacement(unchanged),
+            candidate.displacement(changed),
+            strict=True,
         ):
             assert law.keys() == again.keys() and all(
                 (law[at] == again[at]).all() for at in law
             ), candidate.key
 
 
-def test_effects_families_candidates_and_parameters_are_those_of_the_written_list():
-    """If a law is meant to have others, `make catalogue` writes the list again; names
+def test_catalogue_agrees_with_its_written_list():
+    """If a law is changed on purpose, `make catalogue` writes the list again; names
     of effects stay, because campaigns and results have them."""
     written = yaml.safe_load(CANDIDATES.read_text(encoding="utf-8"))
     listed = listed_candidates()
@@ -96,12 +100,12 @@ def test_effects_families_candidates_and_parameters_are_those_of_the_written_lis
     ]
 
 
-def test_every_effect_has_its_physics_in_words_and_its_formula_for_print():
+def test_every_effect_has_a_docstring_and_a_formula():
     for name, effect in list_bundled_effects().items():
         assert effect.doc and effect.formula, name
 
 
-def test_every_effect_says_whether_it_moves_the_robot_or_only_what_was_measured_of_it(
+def test_every_effect_states_whether_it_moves_the_robot(
     fanuc,
 ):
     """A correction must not move the robot by an error of the tracker, its targets, the
@@ -139,7 +143,7 @@ def test_parameters_have_units_names_and_positive_plausible_sizes(chain):
         assert not candidate.distinct_angles or candidate.joints or candidate.turning
 
 
-def test_nest_is_no_candidate_where_the_last_joint_does_not_turn():
+def test_nest_eccentricity_needs_a_revolute_last_joint():
     """A reflector that a slide carries keeps its side to the tracker: there is no angle
     that it could circle with."""
     scara = "Rz(q1) Tx(0.4) Rz(q2) Tx(0.3) Tz(-q3) [end]"
@@ -151,7 +155,7 @@ def test_nest_is_no_candidate_where_the_last_joint_does_not_turn():
     assert offered == [False, True]
 
 
-def test_plausible_sizes_move_the_end_by_what_a_deviation_can(fanuc):
+def test_plausible_sizes_cause_plausible_displacements(fanuc):
     around = conditions_on(fanuc.chain, make_states(6, 30, seed=1), fanuc.compliance)
     model = make_model(fanuc.chain)
     states = make_states(6, 30, seed=1)
@@ -170,7 +174,7 @@ def test_plausible_sizes_move_the_end_by_what_a_deviation_can(fanuc):
 
 
 @pytest.mark.parametrize("chain", ["fixed rotations", *ODD_CHAINS], indirect=True)
-def test_sensitivities_of_every_candidate_are_central_differences(chain):
+def test_sensitivities_of_every_candidate_agree_with_central_differences(chain):
     targets = (
         Target("A", chain.end_effector.name, None),
         Target("B", chain.points[0].name, (0.1, -0.2, 0.05)),
@@ -186,21 +190,23 @@ def test_sensitivities_of_every_candidate_are_central_differences(chain):
             model = make_model(chain, targets, 6, effects=(candidate,))
         estimate = make_estimate(model, seed=3)
         around = evaluate_conditions(model, estimate, states)
-        seen = observe_exactly(model, estimate, states)
+        observations = observe_exactly(model, estimate, states)
         steps = np.diag(small_steps(model, estimate))
         # Of a long law, steps of all parameters at once.
         steps = (
             steps if len(steps) < 6 else rng.standard_normal((2, len(steps))) @ steps
         )
-        expected = slopes(model, estimate, seen, around, steps)
-        found = linearize(model, estimate, seen, around).sensitivities @ steps.T
+        expected = slopes(model, estimate, observations, around, steps)
+        actual = (
+            linearize(model, estimate, observations, around).sensitivities @ steps.T
+        )
         scale = np.maximum(np.abs(expected).max(axis=(0, 1)), 1e-300)
         np.testing.assert_allclose(
-            found / scale, expected / scale, rtol=0, atol=1e-5, err_msg=candidate.key
+            actual / scale, expected / scale, rtol=0, atol=1e-5, err_msg=candidate.key
         )
 
 
-def test_effects_that_need_a_load_do_nothing_without_and_the_others_do_something(chain):
+def test_only_effects_that_need_a_load_vanish_without_a_load(chain):
     states = make_states(chain.coordinates, 6, seed=7)
     states.wrench[:] = 0.0
     around = conditions_on(chain, states)
@@ -208,14 +214,14 @@ def test_effects_that_need_a_load_do_nothing_without_and_the_others_do_something
         made = displacements(
             candidate, around, *[shape.start for shape in candidate.shapes]
         )
-        # What hangs on the flange weighs there always, and is told from the arm's own
-        # weight where loads or masses are known.
+        # A payload always has a weight; it needs a load only to be distinguishable from
+        # the weight of the arm.
         assert made.any() != (
             "load" in candidate.needs and candidate.effect != "payload"
         ), candidate.key
 
 
-def test_needs_are_those_covariates_that_the_displacement_reads(fanuc):
+def test_needs_are_the_covariates_that_the_displacement_reads(fanuc):
     around = conditions_on(fanuc.chain, make_states(6, 5, seed=8))
     for candidate in candidates_on(around.sites).values():
         for name, attribute in (
@@ -232,9 +238,8 @@ def test_needs_are_those_covariates_that_the_displacement_reads(fanuc):
                 candidate.displacement(without, *start)
 
 
-def test_laws_go_with_the_loads_of_no_other_coordinates_than_they_displace(chain):
-    """What errors of masses do by way of an effect is asked for on these coordinates
-    alone."""
+def test_laws_depend_only_on_loads_of_coordinates_that_they_displace(chain):
+    """The sensitivities to errors of masses are computed on these coordinates alone."""
     around = conditions_on(chain, make_states(chain.coordinates, 6, seed=12))
     for candidate in candidates_on(around.sites).values():
         start = [shape.start for shape in candidate.shapes]
@@ -286,7 +291,7 @@ def add_module(tmp_path, monkeypatch):
         vars(elastocal.effects).pop(name, None)
 
 
-def test_adding_an_effect_is_adding_one_module(fanuc, add_module):
+def test_a_new_effect_needs_only_one_module(fanuc, add_module):
     before = set(list_bundled_effects())
     add_module("anything", NEW)
     assert set(list_bundled_effects()) == {*before, "sinking_foot"}
@@ -312,6 +317,6 @@ def test_adding_an_effect_is_adding_one_module(fanuc, add_module):
     )
 
 
-def test_effect_that_the_catalogue_does_not_have_is_refused(fanuc):
+def test_an_unknown_effect_is_refused(fanuc):
     with refused("campaign.yaml", "declared", "link_weight"):
         declared_candidates(["link_wait"], equipped(fanuc.chain), "campaign.yaml")

@@ -1,9 +1,8 @@
-"""Every effect of the catalogue against its closed form: what a unit of each parameter
-does to every measuring point.
+"""Effects of the catalogue against closed forms of the displacement of every measuring
+point.
 
-Closed forms are written with the robot's own chain as pinocchio sees it: frames, axes,
-Jacobians and loads carried to a frame by hand. The closed form of a new effect is in
-its own test, see `helpers/closed_forms.py`.
+Closed forms use frames, axes, Jacobians and loads of the robot's chain from pinocchio. The
+closed form of a new effect is in its own test, see `helpers/closed_forms.py`.
 """
 
 import numpy as np
@@ -44,18 +43,17 @@ def nest_eccentricity(arm, law, name):
 
 
 def scaled(arm, amount):
-    """All positions further from the foot by shares."""
-    found = np.zeros((STATES, len(arm.chain.points), 6))
+    """All positions, farther from the base by these shares."""
+    displacement = np.zeros((STATES, len(arm.chain.points), 6))
     for number, point in enumerate(arm.chain.points):
-        found[:, number, :3] = (
+        displacement[:, number, :3] = (
             arm.frame(point.after)[0] * np.broadcast_to(amount, STATES)[:, None]
         )
-    return found
+    return displacement
 
 
 def grown(arm, amount):
-    """The same but for the travel of carriages, whose scale and spindle are not of the
-    castings."""
+    """As `scaled`, but without the travel of carriages, which castings do not change."""
     travel = np.array(
         [t.kind == "T" for t in arm.chain.transforms if t.coordinate is not None]
     )
@@ -86,13 +84,13 @@ def link_weight(arm, law, name):
 
 
 def declared_masses(arm, law, name):
-    """Of all the masses that the sites declare, or of the one that the name counts."""
+    """Torques of all declared masses, or of the one whose number is in the name."""
     torques = []
     for mass in MASSES:
         after = arm.places[mass.link - 1] + 1
         along = [
-            part * weight(arm, after, f"moment_{axis}")
-            for part, axis in zip(mass.centre_m, "xyz", strict=True)
+            component * weight(arm, after, f"moment_{axis}")
+            for component, axis in zip(mass.centre_m, "xyz", strict=True)
         ]
         torques.append(mass.mass_kg * (weight(arm, after, "") + sum(along)))
     torque = sum(torques) if name == "share" else torques[int(name.rsplit("_", 1)[1])]
@@ -110,54 +108,60 @@ def motor_eccentricity(arm, law, name):
 
 def bearing_runout(arm, law, name):
     motion, axis, kind, order = name.split("_")
-    place = arm.places[law.joints[0] - 1]
-    fixed = arm.frame(place)[1]
+    position = arm.places[law.joints[0] - 1]
+    fixed = arm.frame(position)[1]
     amount = wave(f"{kind}_{order}", joint_angle(arm, law))
     if motion == "wobble":
-        return six(arm, place + 1, fixed, f"r{axis}", amount)
-    return six(arm, place + 1, fixed, f"d{axis}", amount, arm.far_end(law.joints[0]))
+        return six(arm, position + 1, fixed, f"r{axis}", amount)
+    return six(arm, position + 1, fixed, f"d{axis}", amount, arm.far_end(law.joints[0]))
+
+
+def bent_links(arm, law):
+    return arm.long if law.detail == "one section" else list(law.joints) or [0]
 
 
 def link_elasticity(arm, law, name, taper):
-    """Curvature and twist under the load on each piece of the link, integrated to its
-    far end."""
-    links = arm.long if law.detail == "one section" else list(law.joints) or [0]
-    found = 0.0
-    # Of the uniform link that a force shifts, or a moment twists, as far.
+    """Integrate curvature and twist by the load on each piece of a link to its far
+    end."""
+    displacement = 0.0
+    # The parameter is that of a uniform link with the same deflection or torsion.
     power = 2 if name.startswith("bending") else 0
     softer = (1 - taper * (NODES + 1) / 2) ** -3.0
     uniform = (
         1.0 / (power + 1) / (WEIGHTS / 2 @ (softer * (1 - (NODES + 1) / 2) ** power))
     )
-    for link in links:
-        after, (along, length) = arm.far_end(link), arm.link(link)
+    for link in bent_links(arm, law):
+        after = arm.far_end(link)
+        along, length = arm.link(link)
         force, moment = arm.load(after)
         shift = turn = np.zeros((STATES, 3))
-        for place, weighs in zip(
+        for position, weighs in zip(
             length * (NODES + 1) / 2, WEIGHTS * length / 2, strict=True
         ):
-            lever = along * (length - place)
-            there = (
+            lever = along * (length - position)
+            bending_and_twist = (
                 (moment + np.cross(lever, force))
                 * weighs
                 * uniform
-                / (1 - taper * place / length) ** 3
+                / (1 - taper * position / length) ** 3
             )
-            twist = along * (there * along).sum(axis=1, keepdims=True)
-            part = there - twist if name.startswith("bending") else twist
-            shift = shift + np.cross(part, lever)
-            turn = turn + part
-        found = found + arm.moved(after, shift, turn)
-    return found
+            twist = along * (bending_and_twist * along).sum(axis=1, keepdims=True)
+            component = (
+                bending_and_twist - twist if name.startswith("bending") else twist
+            )
+            shift = shift + np.cross(component, lever)
+            turn = turn + component
+        displacement = displacement + arm.moved(after, shift, turn)
+    return displacement
 
 
 def joint_tilt(arm, law, name):
-    place = arm.places[law.joints[0] - 1] + 1
-    rotation = arm.frame(place)[1]
-    moment = arm.load(place)[1]
+    position = arm.places[law.joints[0] - 1] + 1
+    rotation = arm.frame(position)[1]
+    moment = arm.load(position)[1]
     return six(
         arm,
-        place,
+        position,
         rotation,
         f"r{name[-1]}",
         (rotation[..., "xyz".index(name[-1])] * moment).sum(axis=1),
@@ -176,9 +180,9 @@ def base_compliance(arm, law, name):
 
 
 def cross_compliance(arm, law, name):
-    one, other = law.joints
-    return arm.of_joint(one, arm.torque[:, other - 1]) + arm.of_joint(
-        other, arm.torque[:, one - 1]
+    first, second = law.joints
+    return arm.of_joint(first, arm.torque[:, second - 1]) + arm.of_joint(
+        second, arm.torque[:, first - 1]
     )
 
 
@@ -226,7 +230,7 @@ def by_wrong_wrench(change):
 
 
 def turned_force(axis, force):
-    """By central differences of a finite turn."""
+    """Central differences of a finite rotation."""
     ahead, behind = (
         Rotation.from_rotvec(sign * 1e-4 * axis).apply(force) for sign in (1, -1)
     )
@@ -260,8 +264,8 @@ def temperature_gradient(arm, law, name, *lag):
     curvature = warmer * (axis - along * (axis * along).sum(axis=1, keepdims=True))
     pieces = zip(length * (NODES + 1) / 2, WEIGHTS * length / 2, strict=True)
     shift = sum(
-        np.cross(curvature * weighs, along * (length - place))
-        for place, weighs in pieces
+        np.cross(curvature * weighs, along * (length - position))
+        for position, weighs in pieces
     )
     return arm.moved(after, shift, length * curvature)
 
@@ -335,7 +339,7 @@ CLOSED_FORMS = {
 }
 
 
-def test_every_effect_has_a_closed_form_here_or_in_a_test_of_its_own():
+def test_every_effect_has_a_closed_form():
     effects = list_bundled_effects()
     assert set(CLOSED_FORMS) <= set(effects)
     for name in set(effects) - set(CLOSED_FORMS):
@@ -344,13 +348,13 @@ def test_every_effect_has_a_closed_form_here_or_in_a_test_of_its_own():
 
 @pytest.mark.parametrize("chain_name", CHAINS)
 @pytest.mark.parametrize("name", sorted(CLOSED_FORMS))
-def test_effect_is_its_closed_form(name, chain_name):
+def test_effect_agrees_with_its_closed_form(name, chain_name):
     effect = list_bundled_effects()[name]
     check_closed_form(effect.candidates, CLOSED_FORMS[name], chain_name)
 
 
 @pytest.mark.parametrize("chain_name", CHAINS)
-def test_springs_of_the_declared_model_turn_each_joint_by_its_torque(chain_name):
+def test_joint_compliances_rotate_each_joint_by_its_torque(chain_name):
     def closed(arm, law, name):
         joint = int(name.removeprefix("c"))
         turned = arm.of_joint(joint, arm.torque[:, joint - 1])

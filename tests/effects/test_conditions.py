@@ -1,5 +1,4 @@
-"""What the states of a campaign have that effects may need, and how far it had come in
-each."""
+"""The needs of effects that states meet, and the progress of a campaign."""
 
 from dataclasses import replace
 
@@ -11,21 +10,21 @@ from elastocal.effects.conditions import compute_progress, find_offered_needs
 from elastocal.mechanics.sites import build_sites
 
 
-def test_progress_counts_rows_of_the_campaign_or_else_poses():
+def test_progress_counts_rows_of_the_campaign_or_poses():
     states = make_states(6, 5, seed=16)
     np.testing.assert_allclose(compute_progress(states), np.arange(5) / 4)
-    # Some of the rows of a longer campaign.
+    # The states are the first rows of a longer campaign.
     np.testing.assert_allclose(compute_progress(states, (1, 21)), np.arange(5) / 20)
-    without = replace(states, row=None)
-    np.testing.assert_allclose(compute_progress(without), np.arange(5) / 4)
-    # What is to be measured comes after all rows.
-    np.testing.assert_array_equal(compute_progress(without, (1, 21)), np.ones(5))
+    without_rows = replace(states, row=None)
+    np.testing.assert_allclose(compute_progress(without_rows), np.arange(5) / 4)
+    # Measurements that are still planned come after all rows.
+    np.testing.assert_array_equal(compute_progress(without_rows, (1, 21)), np.ones(5))
 
 
 @pytest.mark.parametrize(
     ("column", "name"), [("time_s", "time"), ("temperature_c", "temperature")]
 )
-def test_time_and_temperature_are_there_where_they_change(kuka, column, name):
+def test_time_and_temperature_are_offered_if_they_change(kuka, column, name):
     sites = build_sites(kuka)
     states = make_states(6, 5, seed=1)
     assert name in find_offered_needs(

@@ -1,5 +1,5 @@
-"""Weights, declared or not: torques by pinocchio, slopes by central differences, fits
-with wrong masses, a compensator."""
+"""Declared and undeclared weights: torques against pinocchio, sensitivities against central
+differences, priors, and levers of pulls."""
 
 from dataclasses import replace
 
@@ -59,43 +59,40 @@ def gravity_by_pinocchio(chain, after, mass, centre, gravity, coordinates):
     one.model.appendBodyToJoint(frame.parentJoint, inertia, pin.SE3.Identity())
     one.model.gravity.linear = np.array(gravity)
     data = one.model.createData()
-    found = np.zeros((len(coordinates), chain.coordinates))
+    actual = np.zeros((len(coordinates), chain.coordinates))
     for index, q in enumerate(coordinates):
-        found[index, one.order] = -pin.computeGeneralizedGravity(
+        actual[index, one.order] = -pin.computeGeneralizedGravity(
             one.model, data, q[one.order]
         )
-    return found
+    return actual
 
 
 @pytest.mark.parametrize("name", ["fanuc", "fixed rotations", "track"])
-def test_gravity_on_every_coordinate_where_the_robot_has_yielded_is_that_of_pinocchio(
-    name, fanuc
-):
+def test_gravity_at_the_displaced_pose_agrees_with_pinocchio(name, fanuc):
     robot = weighed(
         fanuc if name == "fanuc" else robot_of((OTHER_CHAINS | ODD_CHAINS)[name])
     )
     sites = build_sites(robot)
-    base = candidates_on(sites)["base_compliance"]
-    model = make_model(robot, effects=(base,))
+    model = make_model(robot, effects=[candidates_on(sites)["base_compliance"]])
     estimate = make_estimate(model, seed=2, size=1.0)
     states = make_states(robot.joints, 3, seed=3, force=300.0)
     around = evaluate_conditions(model, estimate, states)
-    at = compute_displaced_coordinates(model, estimate, around)
+    displaced = compute_displaced_coordinates(model, estimate, around)
     corrections = around.mass_corrections.reshape(-1, 4)
     assert corrections.any()
     expected = 0.0
     for mass, correction in zip(robot.masses, corrections, strict=True):
         total = mass.mass_kg + correction[0]
         centre = np.array(mass.centre_m) + correction[1:] / total
-        # Whatever tilts its joint, or the foot, carries it.
+        # The coordinates that tilt its joint, or the base, carry the mass.
         carrying = sites.tilt[mass.link - 1] if mass.link else sites.base
         after = 1 + max(
-            place
-            for place, t in enumerate(sites.chain.transforms)
-            if t.coordinate in carrying
+            number
+            for number, transform in enumerate(sites.chain.transforms)
+            if transform.coordinate in carrying
         )
         expected = expected + gravity_by_pinocchio(
-            sites.chain, after, total, centre, TILTED, at
+            sites.chain, after, total, centre, TILTED, displaced
         )
     np.testing.assert_allclose(
         around.gravity, expected, rtol=0, atol=1e-6 * np.abs(expected).max()
@@ -103,12 +100,16 @@ def test_gravity_on_every_coordinate_where_the_robot_has_yielded_is_that_of_pino
     np.testing.assert_array_equal(around.total, around.load + around.gravity)
 
 
+def select_effects(robot, keys):
+    candidates = candidates_on(build_sites(robot))
+    return [candidates[key] for key in keys]
+
+
 @pytest.mark.parametrize("identified", [True, False], ids=["identified", "nominal"])
-def test_masses_and_compliances_have_exact_sensitivities_with_all_that_they_load(
+def test_sensitivities_to_masses_and_compliances_include_effects_that_they_load(
     fanuc, identified
 ):
     robot = weighed(fanuc)
-    known = candidates_on(build_sites(robot))
     keys = (
         "stiffening@2",
         "lost_motion@3",
@@ -122,7 +123,7 @@ def test_masses_and_compliances_have_exact_sensitivities_with_all_that_they_load
         rows=6,
         compliance=fanuc.compliance,
         identified=identified,
-        effects=[known[key] for key in keys],
+        effects=select_effects(robot, keys),
     )
     estimate = make_estimate(model, seed=4)
     states = make_states(6, 8, seed=5)
@@ -130,7 +131,7 @@ def test_masses_and_compliances_have_exact_sensitivities_with_all_that_they_load
         estimate = replace(
             estimate, coefficients=(fanuc.compliance, *estimate.coefficients[1:])
         )
-    seen = observe_exactly(model, estimate, states)
+    observations = observe_exactly(model, estimate, states)
     around = evaluate_conditions(model, estimate, states)
     listed = list_parameters(model, estimate)
     sizes = [
@@ -143,23 +144,23 @@ def test_masses_and_compliances_have_exact_sensitivities_with_all_that_they_load
         if owner in ("joint_compliance", "declared_weight")
     ]
     steps = np.diag(sizes)[springs]
-    expected = slopes(model, estimate, seen, around, steps)
-    found = linearize(model, estimate, seen, around).sensitivities @ steps.T
+    expected = slopes(model, estimate, observations, around, steps)
+    actual = linearize(model, estimate, observations, around).sensitivities @ steps.T
     largest = np.abs(expected).max(axis=(0, 1))
     np.testing.assert_allclose(
-        found / largest.max(), expected / largest.max(), rtol=0, atol=1e-6
+        actual / largest.max(), expected / largest.max(), rtol=0, atol=1e-6
     )
     moving = largest > 0
     assert moving.sum() >= 6 * identified + 20
     np.testing.assert_allclose(
-        found[..., moving] / largest[moving],
+        actual[..., moving] / largest[moving],
         expected[..., moving] / largest[moving],
         rtol=0,
         atol=2e-4,
     )
 
 
-def test_priors_are_those_of_the_robot_file(fanuc):
+def test_priors_of_masses_follow_from_the_robot_file(fanuc):
     robot = replace(
         fanuc,
         masses=(
@@ -167,48 +168,48 @@ def test_priors_are_those_of_the_robot_file(fanuc):
             Mass(3, 50.0, (0.0, 0.0, 0.01), 0.2),
         ),
     )
-    found = declared_weight(build_sites(robot)).parameters
+    actual = declared_weight(build_sites(robot)).parameters
     # A centre is off by its relative error times its distance from the joint, and lies
     # anywhere in the girth of its link.
     width = 0.1 * np.linalg.norm(build_sites(robot).link_vectors_m, axis=1).sum()
     assert 0.3 < width < 0.7
     first = np.hypot(20.0 * 0.5, 200.0 * width / 12**0.5)
     second = np.hypot(10.0 * 0.1, 50.0 * width / 12**0.5)
-    assert [p.prior_std for p in found] == pytest.approx(
+    assert [p.prior_std for p in actual] == pytest.approx(
         [20.0, *[first] * 3, 10.0, *[second] * 3]
     )
-    assert [p.name for p in found[:2]] == [
+    assert [p.name for p in actual[:2]] == [
         "mass_error_of_link_2",
         "moment_error_x_of_link_2",
     ]
     # As the file states it, a centre on its axis as if it were 0.1 m from there.
-    assert [p.plausible for p in found] == pytest.approx(
+    assert [p.plausible for p in actual] == pytest.approx(
         [20.0, *[20.0 * 0.5] * 3, 10.0, *[10.0 * 0.1] * 3]
     )
 
 
 @pytest.mark.parametrize(
-    ("known", "expected"),
+    ("stated", "expected"),
     [
         ({"payload_kg": 210.0}, 0.15 * 210),
-        # A sixth of the arm's own mass is what arms carry.
+        # Arms carry a sixth of their own mass.
         ({"masses": (600.0, 300.0, 0.0)}, 0.15 * 900 / 6),
         ({"payload_kg": 20.0, "masses": (600.0, 300.0)}, 0.15 * 20),
         # Rated loads grow with the volume that an arm reaches.
         ({}, 0.15 * 8.0 * 3.107**3),
     ],
 )
-def test_plausible_payload_is_a_share_of_what_the_robot_carries_as_far_as_that_is_known(
-    fanuc, known, expected
+def test_plausible_payload_is_a_share_of_the_rated_or_estimated_payload(
+    fanuc, stated, expected
 ):
     masses = tuple(
         Mass(2 + link, mass, (0.0, 0.0, 0.0), 0.1)
-        for link, mass in enumerate(known.get("masses", ()))
+        for link, mass in enumerate(stated.get("masses", ()))
     )
     sites = replace(
         build_sites(replace(fanuc, payload_kg=None)),
         masses=masses,
-        payload_kg=known.get("payload_kg"),
+        payload_kg=stated.get("payload_kg"),
     )
     tool, alone = (c for c in candidates_on(sites).values() if c.effect == "payload")
     assert [p.plausible for p in tool.parameters] == pytest.approx(
@@ -218,10 +219,10 @@ def test_plausible_payload_is_a_share_of_what_the_robot_carries_as_far_as_that_i
 
 
 @pytest.mark.parametrize("share", [0.0, 0.005, 0.05])
-def test_moments_that_are_a_hundredth_off_still_have_a_place_that_turns_with_the_flange_and_others_have_none(
+def test_the_lever_of_a_pull_is_found_if_moments_are_a_hundredth_off(
     share,
 ):
-    """Forces anywhere with the flange anywhere."""
+    """Forces and flange orientations are random."""
     rng = np.random.default_rng(0)
     force = 300.0 * rng.standard_normal((8, 3))
     rotation = Rotation.random(8, rng=rng).as_matrix()
@@ -234,7 +235,7 @@ def test_moments_that_are_a_hundredth_off_still_have_a_place_that_turns_with_the
     )
 
 
-def test_a_bias_is_there_wherever_something_is_recorded_be_it_a_moment_alone(fanuc):
+def test_a_bias_acts_in_all_states_with_a_recorded_force_or_moment(fanuc):
     states = make_states(6, 3, seed=4)
     states.wrench[:] = [
         [300.0, 20.0, 10.0, 1.0, 2.0, 3.0],
@@ -254,7 +255,7 @@ def test_a_bias_is_there_wherever_something_is_recorded_be_it_a_moment_alone(fan
         np.testing.assert_allclose(turned, expected, rtol=1e-12)
 
 
-def test_structure_bears_the_usual_weight_where_neither_masses_nor_loads_are_known(
+def test_without_masses_and_loads_the_structure_bears_the_usual_weight(
     fanuc,
 ):
     """Half of each link at either end, six times the rated load in all: slopes of its

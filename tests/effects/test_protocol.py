@@ -1,5 +1,4 @@
-"""Shapes of laws: the values that a search tries. Candidates: their names and
-places."""
+"""Values that a search tries for shapes; keys and locations of candidates."""
 
 import numpy as np
 import pytest
@@ -20,36 +19,36 @@ TRIED = (
 
 @pytest.mark.parametrize("shape", TRIED, ids=lambda shape: shape.name)
 @pytest.mark.parametrize("count", [1, 2, 5])
-def test_shapes_share_their_range_by_which_of_them_is_nearest(shape, count):
+def test_each_value_of_a_shape_represents_the_closest_part_of_the_range(shape, count):
     """On the scale on which they are spread: counted over a fine grid, whatever their
     order."""
     scale = (lambda value: value) if shape.tried else np.log
     every = np.linspace(scale(shape.lowest), scale(shape.highest), 100_001)
     values = np.random.default_rng(count).uniform(shape.lowest, shape.highest, count)
     nearest = np.argmin(np.abs(every[:, None] - scale(values)), axis=1)
-    found = shape.shares(values)
+    actual = shape.shares(values)
     np.testing.assert_allclose(
-        found, np.bincount(nearest, minlength=count) / len(every), atol=2e-5
+        actual, np.bincount(nearest, minlength=count) / len(every), atol=2e-5
     )
-    assert found.sum() == pytest.approx(1.0)
+    assert actual.sum() == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("shape", TRIED, ids=lambda shape: shape.name)
-def test_shapes_between_two_are_inside_and_evenly_spread_with_the_middle_among_them(
+def test_values_between_two_shapes_are_evenly_spaced_and_include_the_middle(
     shape,
 ):
-    found = (
+    actual = (
         shape.between(0.2, 0.8, 7) if shape.tried else shape.between(1000.0, 4000.0, 7)
     )
-    steps = np.diff(found) if shape.tried else np.diff(np.log(found))
+    steps = np.diff(actual) if shape.tried else np.diff(np.log(actual))
     ends = (0.2, 0.8, 0.5) if shape.tried else (1000.0, 4000.0, 2000.0)
-    assert len(found) == 7 and ends[0] < found[0] and found[-1] < ends[1]
+    assert len(actual) == 7 and ends[0] < actual[0] and actual[-1] < ends[1]
     np.testing.assert_allclose(steps, steps[0])
-    np.testing.assert_allclose(found[3], ends[2])
+    np.testing.assert_allclose(actual[3], ends[2])
 
 
 @pytest.mark.parametrize("few", [1, 2, 3, 7])
-def test_a_few_values_of_a_shape_grow_by_one_factor_from_the_lowest_and_on_to_the_highest(
+def test_values_of_a_shape_form_a_geometric_series_inside_its_range(
     few,
 ):
     """900 s to 36000 s is a factor of 40: a few values part it in so many and one more
@@ -73,7 +72,7 @@ def test_a_few_values_of_a_shape_grow_by_one_factor_from_the_lowest_and_on_to_th
         ((), "column", "column", "law[column]", ("column",)),
     ],
 )
-def test_key_and_location_of_a_candidate_are_its_effect_joints_and_detail(
+def test_key_and_location_of_a_candidate_have_its_effect_joints_and_detail(
     joints, detail, location_name, key, location
 ):
     law = Candidate(

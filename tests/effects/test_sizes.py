@@ -1,5 +1,5 @@
-"""Sizes of effects: complete, in the documentation as in the code, in units of the arm;
-levers and weights by hand."""
+"""Sizes of effects: complete in the documentation, in units of the arm, with levers and
+weights calculated by hand."""
 
 from dataclasses import replace
 
@@ -33,7 +33,7 @@ def plausible(robot):
     }
 
 
-def test_the_page_of_the_method_has_the_table_of_all_sizes():
+def test_the_documentation_has_the_table_of_all_sizes():
     """`make catalogue` writes the table; effects of other packages are not in it."""
     table = SIZES.search(METHOD.read_text(encoding="utf-8"))[2].splitlines()
     rows = {}
@@ -45,7 +45,7 @@ def test_the_page_of_the_method_has_the_table_of_all_sizes():
     assert table[2:] == [line for lines in rows.values() for line in lines]
 
 
-def test_what_yields_is_sized_by_the_compliance_of_the_arm_and_nothing_else_is(fanuc):
+def test_only_sizes_of_elastic_effects_scale_with_the_compliance_of_the_arm(fanuc):
     soft = replace(fanuc, compliance=100.0 * fanuc.compliance)
     stiff_sizes = plausible(fanuc)
     soft_sizes = plausible(soft)
@@ -60,7 +60,9 @@ def test_what_yields_is_sized_by_the_compliance_of_the_arm_and_nothing_else_is(f
         ), (key, name)
 
 
-def test_rigid_joints_are_sized_as_those_of_an_arm_of_this_load_and_reach(fanuc):
+def test_rigid_joints_get_the_typical_compliance_of_an_arm_of_this_load_and_reach(
+    fanuc,
+):
     rigid = replace(fanuc, compliance=0.0 * fanuc.compliance, payload_kg=165.0)
     for joint in range(6):
         ours = list_bundled_effects()["joint_tilt"].size(
@@ -69,21 +71,21 @@ def test_rigid_joints_are_sized_as_those_of_an_arm_of_this_load_and_reach(fanuc)
         assert 0.1 < ours / fanuc.compliance[joint] < 3.0
 
 
-def test_parameters_have_the_sign_of_the_size(fanuc):
-    own = list_bundled_effects()
-    (tilt,) = own["joint_tilt"].parameters(
+def test_parameters_have_the_sign_of_their_size(fanuc):
+    effects = list_bundled_effects()
+    (tilt,) = effects["joint_tilt"].parameters(
         "tilt", ["t"], "rad/(N m)", build_sites(fanuc), 0, over=4.0
     )
     assert (tilt.sign, tilt.plausible) == (1, pytest.approx(0.25 * fanuc.compliance[0]))
     assert (
-        own["stiffening"]
+        effects["stiffening"]
         .parameters("lost beyond", ["b"], "rad/(N m)", build_sites(fanuc), 0)[0]
         .sign
         == -1
     )
 
 
-def test_the_full_torque_has_the_lever_of_a_tool_at_least_and_the_weight_behind_the_joint():
+def test_the_full_torque_has_at_least_the_lever_of_a_tool_and_includes_the_links():
     """Levers of the outstretched arm, by hand; the weight of a mass half way along its
     link."""
     # The weight of a robot that stands on the moon.
@@ -104,7 +106,7 @@ def test_the_full_torque_has_the_lever_of_a_tool_at_least_and_the_weight_behind_
     )
     # It turns joint 2 at a metre, and joint 1, whose axis stands upright, not at all;
     # it is before joint 3.
-    found = [full_torque_Nm(loaded, joint) for joint in range(3)]
-    assert found[0] == pytest.approx(31 * g) and found[2] == pytest.approx(5 * g)
+    torques = [full_torque_Nm(loaded, joint) for joint in range(3)]
+    assert torques[0] == pytest.approx(31 * g) and torques[2] == pytest.approx(5 * g)
     # The longest lever is that of some poses, so almost that of the arm outstretched.
-    assert 0.98 * 30 * g < found[1] - 21 * g <= 30 * g
+    assert 0.98 * 30 * g < torques[1] - 21 * g <= 30 * g

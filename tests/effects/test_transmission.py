@@ -1,5 +1,4 @@
-"""Effects periodic in the angle of a joint, beyond their closed forms: ratios that are
-known, orders between integers."""
+"""Effects that are periodic in a joint angle: known ratios, and orders between integers."""
 
 from dataclasses import replace
 
@@ -16,12 +15,12 @@ from synthetic import (
 from elastocal.effects.catalogue import candidates_on
 
 
-def test_order_may_lie_anywhere_between_two_integers_and_away_from_both(fanuc):
-    known = candidates_on(equipped(fanuc))
+def test_orders_between_two_integers_are_found(fanuc):
+    candidates = candidates_on(equipped(fanuc))
     states = make_states(6, 5, seed=3)
     bands = [
         c
-        for c in known.values()
+        for c in candidates.values()
         if c.effect == "transmission_order" and c.joints == (3,)
     ]
     for above, band in enumerate(bands, 1):
@@ -62,7 +61,7 @@ FULL_NM = 8.0 * 2.0**3 * 9.80665 * 2.0
     ],
 )
 @pytest.mark.parametrize("payload_kg", [None, 100.0])
-def test_torques_of_laws_are_shares_of_the_full_torque_of_the_joint(
+def test_torques_of_gear_laws_are_shares_of_the_full_torque(
     key, lowest, start, highest, payload_kg
 ):
     """Lost motion is read at 3 % of it. Of a kilonewton, or of the rated payload, two

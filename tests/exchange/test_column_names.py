@@ -1,5 +1,5 @@
-"""What columns are: found by their names and units, asked for where they could be two
-things; orientations in any notation."""
+"""Columns are recognized by names and units, ambiguous ones are refused, and orientations
+are read in any notation."""
 
 from dataclasses import replace
 
@@ -48,7 +48,7 @@ def test_headers_are_recognized(header, name, unit):
     assert name is None or is_name(name)
 
 
-def test_units_are_those_of_the_kind():
+def test_units_belong_to_the_kind_of_the_column():
     scales = {"x": 1e-3, "q7": 1e-3, "q1": np.pi / 180, "fx": 9.80665}
     assert find_scales(
         {"x": "mm", "q7": "mm", "q1": "degrees", "fx": "kgf"}
@@ -56,7 +56,7 @@ def test_units_are_those_of_the_kind():
 
 
 @pytest.mark.parametrize("header", ["Load [kg]", "Target [mm]"])
-def test_a_number_or_name_with_a_unit_is_a_question(tmp_path, header):
+def test_a_number_or_name_with_a_unit_is_refused(tmp_path, header):
     text = f"q1,x,y,z,{header}\n0,1,2,3,4\n"
     with refused(
         tmp_path / "t.csv", repr(header), f"--ignore {header!r}", f"={header!r}"
@@ -108,7 +108,7 @@ A_RAIL = robot_of("Tx(q1) Rz(q2) [A]")
         ),
     ],
 )
-def test_what_may_be_two_things_or_is_there_in_part_is_a_question(
+def test_ambiguous_and_incomplete_columns_are_refused(
     tmp_path, header, options, robot, words
 ):
     row = ",".join("1" * len(header.partition("\n")[0].split(",")))
@@ -116,53 +116,53 @@ def test_what_may_be_two_things_or_is_there_in_part_is_a_question(
         table(tmp_path, f"{header}\n{row}\n", replace(PLAIN, **options), robot)
 
 
-def test_options_go_before_what_a_table_says(tmp_path):
-    found = table(
+def test_options_precede_the_header_of_the_table(tmp_path):
+    imported = table(
         tmp_path,
         "q1,x,y,z\nmm,mm,mm,mm\n90,1,2,3\n",
         replace(PLAIN, units={"q1": "deg"}),
     )
-    assert found.table["q1"].tolist() == [np.pi / 2]
+    assert imported.table["q1"].tolist() == [np.pi / 2]
     joints = {"q1": "q[0]", "q2": "q[1]"}
-    found = table(
+    imported = table(
         tmp_path,
         f"q[0],q[1],x,y,z,qx,qy,qz\n90,0,{ROW},0,0,0\n",
         replace(PLAIN, rotation="none", columns=joints),
     )
-    assert found.table["q1"].tolist() == [np.pi / 2] and "rx" not in found.table
+    assert imported.table["q1"].tolist() == [np.pi / 2] and "rx" not in imported.table
 
 
-def vector(found):
-    return [found.table[name][0] for name in ("rx", "ry", "rz")]
+def vector(imported):
+    return [imported.table[name][0] for name in ("rx", "ry", "rz")]
 
 
-def test_orientations_are_of_the_columns_that_are_stated_or_of_q0_beside_the_other_parts(
+def test_orientations_are_read_from_stated_columns_and_quaternions_from_q0_to_q3(
     tmp_path,
 ):
     angles = dict(zip(("e1", "e2", "e3"), "ABC", strict=True))
     options = replace(PLAIN, rotation="euler:ZYX", columns=angles)
-    found = table(
+    imported = table(
         tmp_path, f"q1,x,y,z,A,B,C,E1,E2,E3\n1,{ROW},10,20,30,0,0,0\n", options
     )
     np.testing.assert_allclose(
-        vector(found),
+        vector(imported),
         Rotation.from_euler("ZYX", [10, 20, 30], degrees=True).as_rotvec(),
     )
-    found = table(
+    imported = table(
         tmp_path,
         f"q1,q2,x,y,z,q0,qx,qy,qz\n10,20,{ROW},-0.509038,0.770622,-0.290230,-0.250575\n",
     )
     np.testing.assert_allclose(
-        vector(found), [-1.85636369, 0.69913851, 0.60361478], atol=1e-6
+        vector(imported), [-1.85636369, 0.69913851, 0.60361478], atol=1e-6
     )
     parts = {"qw": "q1", "qx": "q2", "qy": "q3", "qz": "q4", "q1": "rax_1"}
-    found = table(
+    imported = table(
         tmp_path,
         f"rax_1,x,y,z,q1,q2,q3,q4\n10,{ROW},0,1,0,0\n",
         replace(PLAIN, columns=parts),
     )
     np.testing.assert_allclose(
-        [*vector(found), found.table["q1"][0]], [np.pi, 0, 0, np.radians(10)]
+        [*vector(imported), imported.table["q1"][0]], [np.pi, 0, 0, np.radians(10)]
     )
 
 
@@ -178,22 +178,22 @@ def test_columns_may_have_the_names_of_the_robots_joints(tmp_path, headers):
         robot_of("Tx(q1) Rz(q2) Tx(1) Rz(q3) [A]"),
         joint_names=("rail", "shoulder_pan_joint", "J1"),
     )
-    found = table(
+    imported = table(
         tmp_path, f"{headers},rail velocity,x,y,z\n1,2,3,9,{ROW}\n", PLAIN, robot
     )
     np.testing.assert_allclose(
-        [found.table[name][0] for name in ("q1", "q2", "q3")],
+        [imported.table[name][0] for name in ("q1", "q2", "q3")],
         [0.001, *np.radians([2, 3])],
     )
-    assert found.ignored == ("rail velocity",)
+    assert imported.ignored == ("rail velocity",)
     # What was found out needs no robot a second time.
     assert (
-        read_measurement_table(tmp_path / "t.csv", found.options).options
-        == found.options
+        read_measurement_table(tmp_path / "t.csv", imported.options).options
+        == imported.options
     )
 
 
-def test_rounded_values_pass_and_what_is_no_rotation_is_marked():
+def test_rounded_rotations_are_accepted_and_other_matrices_are_marked():
     """That each notation is read as it is meant, tests/fuzz/test_dialects.py has."""
     rounded = np.round(
         Rotation.random(20, random_state=3).as_matrix().reshape(-1, 9), 4

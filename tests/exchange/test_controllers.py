@@ -1,5 +1,4 @@
-"""Programs say each target in the controller's words; names that it does not have are
-refused, unclear axes asked for."""
+"""Programs state all targets; forbidden program names and unclear axes are refused."""
 
 import re
 from pathlib import Path
@@ -42,16 +41,16 @@ def targets(name, **options):
 
 def test_a_language_is_found_by_its_name():
     suffixes = {"krl": ".src", "rapid": ".mod", "tp": ".ls", "urscript": ".script"}
-    assert {name: each.suffix for name, each in ALL.items()} == suffixes
+    assert {name: target_text.suffix for name, target_text in ALL.items()} == suffixes
     assert all(find_controller(name) is controller for name, controller in ALL.items())
     with refused("--format", "'karel'", "krl"):
         find_controller("karel")
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_every_target_stands_in_the_program_to_a_microdegree(name):
-    found, text = targets(name)
-    read = np.array([numbers(each)[:6] for each in found])
+def test_programs_state_targets_to_a_microdegree(name):
+    targets_in_text, text = targets(name)
+    read = np.array([numbers(target_text)[:6] for target_text in targets_in_text])
     np.testing.assert_allclose(
         read if name == "urscript" else np.radians(read), ANGLES, atol=1e-8
     )
@@ -71,22 +70,22 @@ def test_every_target_stands_in_the_program_to_a_microdegree(name):
     ],
 )
 def test_a_rail_is_the_first_external_axis_in_millimetres(name, written):
-    found, _ = targets(name, rail=True)
-    for target, place in zip(found, RAIL[:, 0], strict=True):
-        assert written.format(f"{1e3 * place:.6f}") in target
+    targets_in_text, _ = targets(name, rail=True)
+    for target, rail_position in zip(targets_in_text, RAIL[:, 0], strict=True):
+        assert written.format(f"{1e3 * rail_position:.6f}") in target
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_a_name_that_no_program_may_have_is_refused(name):
-    words = ["TARGET_3"] if name == "rapid" else []
+def test_a_forbidden_program_name_is_refused(name):
+    reserved_names = ["TARGET_3"] if name == "rapid" else []
     longest = [] if name == "urscript" else ["x" * 40]
-    for stem in ("1st", "my targets", "größe", "a-b", *longest, *words):
+    for stem in ("1st", "my targets", "größe", "a-b", *longest, *reserved_names):
         with refused(stem, "name of a program", ALL[name].words):
             check_name(ALL[name], Path(stem + ALL[name].suffix))
     assert check_name(ALL[name], Path("out/targets_2.any")) == "targets_2"
 
 
-def test_six_joints_that_turn_are_plain_a_rail_is_an_external_axis_and_others_are_asked_for():
+def test_axes_of_six_joints_and_a_rail_are_found_and_others_must_be_stated():
     assert find_axes(ALL["krl"], (True, *SIX), "") == (
         "E1",
         "A1",

@@ -1,5 +1,5 @@
-"""Denavit-Hartenberg tables and kinematics files to robots, beside pinocchio; every
-fault is one line with line and column."""
+"""Robots of Denavit-Hartenberg tables and kinematics files against pinocchio; every fault
+is reported in one line, with line and column."""
 
 import math
 
@@ -65,7 +65,7 @@ tables = st.lists(st.tuples(angle, length, length, angle), min_size=1, max_size=
 
 @settings(max_examples=20, deadline=None)
 @given(rows=tables, modified=st.booleans())
-def test_any_table_is_where_its_notation_puts_it(tmp_path_factory, rows, modified):
+def test_any_table_has_the_poses_of_its_notation(tmp_path_factory, rows, modified):
     assert_stands(
         robot_from_dh(
             write(tmp_path_factory.mktemp("dh"), rows), RADIANS, modified=modified
@@ -89,7 +89,7 @@ UR5_CALIBRATED = [
 @pytest.mark.parametrize(
     ("lever", "modified"), [(None, False), (3.0, True), (300.0, False)]
 )
-def test_lengths_that_cancel_along_nearly_parallel_axes_become_short_ones(
+def test_lengths_that_cancel_along_nearly_parallel_axes_become_short(
     tmp_path, lever, modified
 ):
     rows = [[*row] for row in UR5_CALIBRATED]
@@ -105,8 +105,11 @@ def read(folder, text, **options):
     return robot_from_dh(table(folder, text), options=DhOptions(**options), name="two")
 
 
-def test_a_row_is_in_si_units_and_names_come_along(tmp_path):
-    text = "# maker's manual\njoint; theta_offset_deg; d_mm; a_m; alpha; type\n\nbase;90;250;-0,1;-1,5;R\nrest ;0;0;0;6,2;\n"
+def test_rows_are_converted_to_si_units_and_joint_names_are_kept(tmp_path):
+    text = (
+        "# maker's manual\njoint; theta_offset_deg; d_mm; a_m; alpha; type\n\n"
+        "base;90;250;-0,1;-1,5;R\nrest ;0;0;0;6,2;\n"
+    )
     result = read(tmp_path, text, angles="rad", lengths="mm")
     assert (result.document["joint_names"], result.document["name"]) == (
         ["base", "rest"],
@@ -185,15 +188,15 @@ FAULTS = {
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_names_its_line_and_column(tmp_path, fault):
-    text, key, words = FAULTS[fault]
-    with refused(table(tmp_path, text), key, *words):
+    text, key, fragments = FAULTS[fault]
+    with refused(table(tmp_path, text), key, *fragments):
         robot_from_dh(
             tmp_path / "arm.csv",
             options=DhOptions("deg") if fault == "no unit" else PLAIN,
         )
 
 
-def test_degrees_where_radians_are_stated_and_what_is_no_table_are_refused(tmp_path):
+def test_degrees_stated_as_radians_and_files_without_a_table_are_refused(tmp_path):
     with refused(
         table(tmp_path, "theta_offset,d,a,alpha\n0,0.162,0,1.5708\n0,0,-0.4,-90\n"),
         "line 3, column alpha",
@@ -216,8 +219,19 @@ ORIGINS = {
 }
 
 
+def pose_by_pinocchio(angles):
+    """Pose of the last link of the arm of `ORIGINS`."""
+    pose = pin.SE3.Identity()
+    for name, angle in zip(ORIGINS, angles, strict=True):
+        *shift, roll, pitch, yaw = ORIGINS[name]
+        rotation = pin.rpy.rpyToMatrix(roll, pitch, yaw)
+        origin = pin.SE3(rotation, np.array(shift, float))
+        pose = pose * origin * screw("z", angle, 0.0)
+    return pose
+
+
 @pytest.mark.parametrize("order", [1, -1])
-def test_a_calibrated_arm_is_where_its_origins_put_it(tmp_path, order):
+def test_a_calibrated_arm_has_the_poses_of_its_origins(tmp_path, order):
     described = {
         name: dict(zip(KEYS, ORIGINS[name], strict=True))
         for name in [*ORIGINS][::order]
@@ -229,12 +243,13 @@ def test_a_calibrated_arm_is_where_its_origins_put_it(tmp_path, order):
     )
     result = robot_from_dh(path, name="ur5")
     robot = parse_robot(yaml.safe_load(format_robot_file(result)))
-    wrist = "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"
     assert robot.joint_names == (
         "shoulder_pan_joint",
         "shoulder_lift_joint",
         "elbow_joint",
-        *wrist,
+        "wrist_1_joint",
+        "wrist_2_joint",
+        "wrist_3_joint",
     )
     assert robot.chain.end_effector.name == "wrist_3" and any(
         "base_link" in note for note in result.notes
@@ -242,22 +257,19 @@ def test_a_calibrated_arm_is_where_its_origins_put_it(tmp_path, order):
     q = np.random.default_rng(0).uniform(-3, 3, (5, 6))
     position, rotation = compute_poses(robot.chain, q, robot.chain.end_effector)
     for number, angles in enumerate(q):
-        at = pin.SE3.Identity()
-        for name, angle in zip(ORIGINS, angles, strict=True):
-            *shift, roll, pitch, yaw = ORIGINS[name]
-            at = (
-                at
-                * pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), np.array(shift, float))
-                * screw("z", angle, 0.0)
-            )
-        np.testing.assert_allclose(position[number], at.translation, rtol=0, atol=1e-9)
-        np.testing.assert_allclose(rotation[number], at.rotation, rtol=0, atol=1e-9)
+        expected = pose_by_pinocchio(angles)
+        np.testing.assert_allclose(
+            position[number], expected.translation, rtol=0, atol=1e-9
+        )
+        np.testing.assert_allclose(
+            rotation[number], expected.rotation, rtol=0, atol=1e-9
+        )
     with refused("--modified", "", "kinematics"):
         robot_from_dh(path, modified=True)
 
 
 @pytest.mark.parametrize(
-    ("described", "key", "words"),
+    ("described", "key", "fragments"),
     [
         ({"hash": "x"}, "kinematics", ["no link"]),
         ({"shoulder": {"x": 1}}, "kinematics.shoulder", ["found x;", "roll"]),
@@ -269,7 +281,7 @@ def test_a_calibrated_arm_is_where_its_origins_put_it(tmp_path, order):
         ),
     ],
 )
-def test_what_is_no_kinematics_is_refused(tmp_path, described, key, words):
+def test_an_invalid_kinematics_file_is_refused(tmp_path, described, key, fragments):
     path = table(tmp_path, yaml.safe_dump({"kinematics": described}), "calib.yaml")
-    with refused(path, key, *words):
+    with refused(path, key, *fragments):
         robot_from_dh(path)

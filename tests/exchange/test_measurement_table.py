@@ -1,4 +1,4 @@
-"""Another program's table becomes measurements; what it leaves open is asked for."""
+"""Measurements from tables of other programs; ambiguous tables are refused."""
 
 import math
 from dataclasses import replace
@@ -11,7 +11,7 @@ from support import refused, robot_of
 from elastocal.exchange.measurement_table import ImportOptions
 
 
-def test_angles_lengths_and_forces_come_in_si_units_and_forces_of_the_robot_are_turned_round(
+def test_columns_are_converted_to_si_units_and_forces_by_the_robot_change_their_sign(
     tmp_path,
 ):
     text = "J1;J2;X;Y;Z;Fz [kN];Time [ms]\n90;-45;1000;2;3;0,5;2000\n"
@@ -30,44 +30,53 @@ def test_angles_lengths_and_forces_come_in_si_units_and_forces_of_the_robot_are_
         1,
         0,
     )
-    found = table(tmp_path, text, replace(PLAIN, wrench="by-robot"))
+    imported = table(tmp_path, text, replace(PLAIN, wrench="by-robot"))
     assert (
-        found.table["fz"].tolist() == [-500.0]
-        and not np.signbit(found.table["fx"]).any()
+        imported.table["fz"].tolist() == [-500.0]
+        and not np.signbit(imported.table["fx"]).any()
     )
 
 
-def test_poses_loads_and_repeats_are_counted_where_no_column_has_them(tmp_path):
+def test_poses_loads_and_repeats_without_a_column_are_counted(tmp_path):
     rows = ["0,0", "0,0", "0,9", "0,9", "10,0", "10,-9", "10,9", "0.001,9"]
-    found = table(tmp_path, "q1,fz,x,y,z\n" + "\n".join(f"{row},1,2,3" for row in rows))
+    imported = table(
+        tmp_path, "q1,fz,x,y,z\n" + "\n".join(f"{row},1,2,3" for row in rows)
+    )
     # 0.001 degrees apart is the same pose; a repeat is the same state again.
-    assert found.table["pose"].tolist() == [1, 1, 1, 1, 2, 2, 2, 1]
-    assert found.table["load"].tolist() == [0, 0, 1, 1, 0, 1, 2, 1]
-    assert found.table["repeat"].tolist() == [0, 1, 0, 1, 0, 0, 0, 2]
+    assert imported.table["pose"].tolist() == [1, 1, 1, 1, 2, 2, 2, 1]
+    assert imported.table["load"].tolist() == [0, 0, 1, 1, 0, 1, 2, 1]
+    assert imported.table["repeat"].tolist() == [0, 1, 0, 1, 0, 0, 0, 2]
     labelled = table(tmp_path, "Pose ID,q1,x,y,z\nB,1,1,2,3\nA,2,1,2,3\nB,1,1,2,3\n")
     assert labelled.table["pose"].tolist() == [1, 2, 1]
 
 
-def test_the_options_found_out_give_the_same_again(tmp_path):
-    text = "made by\nq1 [rad];X [in];Y [in];Z [in];qw;qx;qy;qz;note\n0,5;1;2;3;1;0;0;0;a\n0,6;1;2;3;0;1;0;0;b\n"
-    found = table(tmp_path, text, ImportOptions(target="smr"))
-    assert found.ignored == ("note",)
-    assert (found.options.separator, found.options.decimal, found.options.header) == (
+def test_the_resolved_options_give_the_same_result(tmp_path):
+    text = (
+        "made by\nq1 [rad];X [in];Y [in];Z [in];qw;qx;qy;qz;note\n"
+        "0,5;1;2;3;1;0;0;0;a\n0,6;1;2;3;0;1;0;0;b\n"
+    )
+    imported = table(tmp_path, text, ImportOptions(target="smr"))
+    assert imported.ignored == ("note",)
+    assert (
+        imported.options.separator,
+        imported.options.decimal,
+        imported.options.header,
+    ) == (
         "semicolon",
         "comma",
         2,
     )
-    assert found.options.units == {"q1": "rad", "x": "in", "y": "in", "z": "in"}
-    again = table(tmp_path, text, found.options)
-    assert again.options == found.options
-    for name, values in found.table.items():
+    assert imported.options.units == {"q1": "rad", "x": "in", "y": "in", "z": "in"}
+    again = table(tmp_path, text, imported.options)
+    assert again.options == imported.options
+    for name, values in imported.table.items():
         np.testing.assert_array_equal(again.table[name], values)
 
 
 @pytest.mark.parametrize(
     "empty", [",,", "nan,NaN,1", "1,-,–", "#N/A,1,2", "-nan(ind),null,None"]
 )
-def test_rows_without_a_position_are_left_out_only_where_asked(tmp_path, empty):
+def test_rows_without_a_position_are_left_out_only_on_request(tmp_path, empty):
     text = f"q1,x,y,z\n1,1,2,3\n2,{empty}\n3,1,2,3\n"
     with refused(
         (tmp_path / "t.csv").as_posix(),
@@ -75,43 +84,44 @@ def test_rows_without_a_position_are_left_out_only_where_asked(tmp_path, empty):
         "--skip-empty" if empty == ",," else "a number such as",
     ):
         table(tmp_path, text)
-    found = table(tmp_path, text, replace(PLAIN, skip_empty=True))
-    assert (len(found.table["x"]), found.skipped) == (2, 1)
+    imported = table(tmp_path, text, replace(PLAIN, skip_empty=True))
+    assert (len(imported.table["x"]), imported.skipped) == (2, 1)
 
 
-def test_a_table_without_a_header_has_the_columns_that_are_stated_and_a_matrix_gives_a_pose(
+def test_a_table_without_a_header_has_the_stated_columns(
     tmp_path,
 ):
     names = ["q1", "q2", *(f"t{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4))]
     text = "90,1,0,-1,0,100,1,0,0,200,0,0,1,300\n-90,2,1,0,0,100,0,1,0,200,0,0,1,300\n"
     with refused(tmp_path / "t.csv", "line 1", "--columns q1,q2"):
         table(tmp_path, text)
-    found = table(tmp_path, text, replace(PLAIN, names=names))
-    assert found.table["q1"].tolist() == [math.pi / 2, -math.pi / 2]
+    imported = table(tmp_path, text, replace(PLAIN, names=names))
+    assert imported.table["q1"].tolist() == [math.pi / 2, -math.pi / 2]
     np.testing.assert_allclose(
-        [found.table[axis][0] for axis in "xyz"], [0.1, 0.2, 0.3]
+        [imported.table[axis][0] for axis in "xyz"], [0.1, 0.2, 0.3]
     )
-    np.testing.assert_allclose(found.table["rz"], [math.pi / 2, 0.0])
-    assert table(tmp_path, text, found.options).options == found.options
+    np.testing.assert_allclose(imported.table["rz"], [math.pi / 2, 0.0])
+    assert table(tmp_path, text, imported.options).options == imported.options
 
 
-def test_several_targets_of_a_row_are_read_by_the_columns_that_are_stated(tmp_path):
+def test_several_targets_of_a_row_are_read_from_stated_columns(tmp_path):
     text = "q1,B_x,B_y,B_z,A x,A y,A z,fz\n90,1,2,3,4,5,6,-5\n7,1,2,3,4,5,6,0\n"
     options = replace(
         PLAIN,
         target=None,
         targets={"SMR": ["A x", "A y", "A z"], "B": ["B_x", "B_y", "B_z"]},
     )
-    found = table(tmp_path, text, options)
-    assert found.table["target"].tolist() == ["SMR", "B"] * 2 and found.table[
+    imported = table(tmp_path, text, options)
+    assert imported.table["target"].tolist() == ["SMR", "B"] * 2 and imported.table[
         "pose"
     ].tolist() == [1, 1, 2, 2]
-    assert found.table["y"].tolist() == [0.005, 0.002] * 2 and found.table[
+    assert imported.table["y"].tolist() == [0.005, 0.002] * 2 and imported.table[
         "fz"
     ].tolist() == [-5, -5, 0, 0]
-    again = table(tmp_path, text, found.options)
+    again = table(tmp_path, text, imported.options)
     assert (
-        again.options == found.options and (again.table["x"] == found.table["x"]).all()
+        again.options == imported.options
+        and (again.table["x"] == imported.table["x"]).all()
     )
     arm = replace(robot_of("Rz(q1) Tx(1) [A]"), joint_names=("turntable",))
     assert (
@@ -149,31 +159,30 @@ def test_several_targets_of_a_row_are_read_by_the_columns_that_are_stated(tmp_pa
         ),
     ],
 )
-def test_time_is_read_as_numbers_or_dates_or_left_out_with_a_note(
-    tmp_path, cells, seconds
-):
+def test_times_are_numbers_or_dates_or_left_out_with_a_note(tmp_path, cells, seconds):
     text = "q1,x,y,z,Time\n" + "".join(
         f"{number},1,2,3,{cell}\n" for number, cell in enumerate(cells.split("|"))
     )
-    found = table(tmp_path, text)
+    imported = table(tmp_path, text)
     if seconds is None:
         assert (
-            "time_s" not in found.table
-            and found.ignored == ("Time",)
-            and "'Time' not read" in found.notes[0]
+            "time_s" not in imported.table
+            and imported.ignored == ("Time",)
+            and "'Time' not read" in imported.notes[0]
         )
         assert table(tmp_path, text, replace(PLAIN, ignore=["Time"])).notes == ()
         with refused(tmp_path / "t.csv", "column Time", "--ignore 'Time'"):
             table(tmp_path, text, replace(PLAIN, columns={"time_s": "Time"}))
         return
-    np.testing.assert_allclose(found.table["time_s"], seconds, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(imported.table["time_s"], seconds, rtol=0, atol=1e-6)
     np.testing.assert_array_equal(
-        table(tmp_path, text, found.options).table["time_s"], found.table["time_s"]
+        table(tmp_path, text, imported.options).table["time_s"],
+        imported.table["time_s"],
     )
 
 
 @pytest.mark.parametrize(
-    ("text", "options", "words"),
+    ("text", "options", "fragments"),
     [
         (
             "q1,x,y,z\n0,1,2,3\n",
@@ -229,18 +238,20 @@ def test_time_is_read_as_numbers_or_dates_or_left_out_with_a_note(
         ),
     ],
 )
-def test_what_is_missing_ambiguous_or_wrong_is_said_with_the_option_that_helps(
-    tmp_path, text, options, words
+def test_an_error_states_the_option_that_resolves_it(
+    tmp_path, text, options, fragments
 ):
-    source = words[0] if words[0].startswith("--") else (tmp_path / "t.csv").as_posix()
-    with refused(source, "", *words):
+    source = (
+        fragments[0]
+        if fragments[0].startswith("--")
+        else (tmp_path / "t.csv").as_posix()
+    )
+    with refused(source, "", *fragments):
         table(tmp_path, text, options)
 
 
 @pytest.mark.parametrize("name", ["=cmd", "@x", "a\u202eb"])
-def test_a_target_whose_name_would_be_a_formula_or_turn_letters_is_refused(
-    tmp_path, name
-):
+def test_a_target_name_that_is_a_formula_or_reverses_text_is_refused(tmp_path, name):
     with refused("", "", ""):
         table(
             tmp_path, f"q1,x,y,z,target\n1,1,2,3,{name}\n", replace(PLAIN, target=None)

@@ -1,5 +1,4 @@
-"""The text of a robot file, read by a person and by the loader; its fixed transforms in
-words, beside pinocchio's rotations."""
+"""The text of a robot file, and its fixed transforms against rotations of pinocchio."""
 
 import numpy as np
 import pinocchio as pin
@@ -40,9 +39,7 @@ def result(tmp_path):
     )
 
 
-def test_the_text_gives_back_the_document_under_a_head_whatever_the_file_is_called(
-    tmp_path, result
-):
+def test_the_text_of_a_robot_file_gives_back_its_document(tmp_path, result):
     lines = format_robot_file(result).splitlines()
     assert yaml.safe_load(format_robot_file(result)) == DOCUMENT
     assert (
@@ -61,7 +58,7 @@ def test_the_text_gives_back_the_document_under_a_head_whatever_the_file_is_call
     )
 
 
-def test_nothing_is_replaced_unless_it_shall_be(tmp_path, result):
+def test_an_existing_file_is_replaced_only_with_force(tmp_path, result):
     path = tmp_path / "robot.yaml"
     refuse_existing(path, force=False)
     write_robot(result, path)
@@ -73,9 +70,9 @@ def test_nothing_is_replaced_unless_it_shall_be(tmp_path, result):
     with refused(path, "", "already", "--force"):
         refuse_existing(path, force=False)
     refuse_existing(path, force=True)
-    for place in (tmp_path, tmp_path / "none" / "robot.yaml"):
-        with refused(place, "", "no place"):
-            refuse_existing(place, force=True)
+    for path_without_folder in (tmp_path, tmp_path / "none" / "robot.yaml"):
+        with refused(path_without_folder, "", "no place"):
+            refuse_existing(path_without_folder, force=True)
 
 
 angles = st.one_of(
@@ -85,7 +82,9 @@ angles = st.one_of(
 
 
 @given(angles, angles, angles, st.tuples(*[st.floats(-2, 2)] * 3))
-def test_a_displacement_is_what_its_words_make(roll, pitch, yaw, shift):
+def test_the_tokens_of_a_displacement_give_back_the_displacement(
+    roll, pitch, yaw, shift
+):
     transform = np.eye(4)
     transform[:3, :3] = pin.rpy.rpyToMatrix(roll, pitch, yaw)
     transform[:3, 3] = shift

@@ -1,4 +1,4 @@
-"""Files of wanted poses: what is in them, and every fault with its row and column."""
+"""Files of target poses: their contents, and every fault with its row and column."""
 
 import numpy as np
 import pytest
@@ -18,27 +18,27 @@ def write_path(folder, header=HEADER, rows=ROWS):
     return path
 
 
-def test_poses_are_read_loads_and_postures_where_they_are(tmp_path):
-    found = read_target_path(write_path(tmp_path), 6)
-    np.testing.assert_array_equal(found.position, [[1.0, 0.2, 0.5], [1.1, 0.2, 0.5]])
+def test_poses_and_optional_loads_and_postures_are_read(tmp_path):
+    targets = read_target_path(write_path(tmp_path), 6)
+    np.testing.assert_array_equal(targets.position, [[1.0, 0.2, 0.5], [1.1, 0.2, 0.5]])
     np.testing.assert_allclose(
-        Rotation.from_matrix(found.rotation[0]).as_rotvec(), [0.1, 0.2, 0.3]
+        Rotation.from_matrix(targets.rotation[0]).as_rotvec(), [0.1, 0.2, 0.3]
     )
-    assert found.start is None and found.wrench is None and len(found) == 2
+    assert targets.start is None and targets.wrench is None and len(targets) == 2
     header = HEADER + ",fx,fy,fz,mx,my,mz,q1,q2"
-    found = read_target_path(
+    targets = read_target_path(
         write_path(tmp_path, header, [row + ",1,2,3,4,5,6,0.1,0.2" for row in ROWS]), 2
     )
-    np.testing.assert_array_equal(found.wrench[1], [1, 2, 3, 4, 5, 6])
+    np.testing.assert_array_equal(targets.wrench[1], [1, 2, 3, 4, 5, 6])
     forces = read_target_path(
         write_path(tmp_path, HEADER + ",fx,fy,fz", [row + ",1,2,3" for row in ROWS]), 2
     )
     np.testing.assert_array_equal(forces.wrench, [[1, 2, 3, 0, 0, 0]] * 2)
-    np.testing.assert_array_equal(found.start[0], [0.1, 0.2])
+    np.testing.assert_array_equal(targets.start[0], [0.1, 0.2])
 
 
 @pytest.mark.parametrize(
-    ("header", "row", "key", "words"),
+    ("header", "row", "key", "fragments"),
     [
         ("x,y,z,rx,ry", "1,0,0,0,0", "line 1", ["no column 'rz'"]),
         (HEADER + ",q3", "1,0,0,0,0,0,1", "line 1", ["unknown column 'q3'"]),
@@ -78,12 +78,12 @@ def test_poses_are_read_loads_and_postures_where_they_are(tmp_path):
         ),
     ],
 )
-def test_a_fault_is_refused_with_its_place(tmp_path, header, row, key, words):
-    with refused((tmp_path / "path.csv").as_posix(), key, *words):
+def test_a_fault_names_its_line_and_column(tmp_path, header, row, key, fragments):
+    with refused((tmp_path / "path.csv").as_posix(), key, *fragments):
         read_target_path(write_path(tmp_path, header, [row]), 2)
 
 
-def test_joint_angles_in_degrees_are_refused_as_such(tmp_path):
+def test_joint_angles_in_degrees_are_refused(tmp_path):
     header = HEADER + "".join(f",q{joint}" for joint in range(1, 7))
     path = write_path(
         tmp_path,

@@ -1,5 +1,5 @@
-"""URDF, read safely, to robot file and back into poses and torques, beside pinocchio;
-every fault is one line."""
+"""Robots of URDF files: poses and torques against pinocchio, and refusals of unsafe or
+invalid files."""
 
 import numpy as np
 import pytest
@@ -76,10 +76,10 @@ def through_its_file(result):
 def assert_same_weight(arm, path, within=None):
     states = make_states(arm.joints, 6, seed=3)
     by_pinocchio = Pinocchio(path)
-    own = build_conditions(build_sites(arm), arm.compliance, states).gravity[
+    torques = build_conditions(build_sites(arm), arm.compliance, states).gravity[
         :, : arm.joints
     ]
-    for angles, torque in zip(states.joint_angles, own, strict=True):
+    for angles, torque in zip(states.joint_angles, torques, strict=True):
         expected = by_pinocchio.weight(
             dict(zip(arm.joint_names, angles, strict=True)), arm.joint_names
         )
@@ -89,7 +89,7 @@ def assert_same_weight(arm, path, within=None):
             rtol=0,
             atol=within or 1e-6 * max(1.0, np.abs(expected).max()),
         )
-    return np.abs(own).max()
+    return np.abs(torques).max()
 
 
 @pytest.mark.parametrize(
@@ -99,9 +99,7 @@ def assert_same_weight(arm, path, within=None):
         ("upper", "hand", ("elbow", "rail", "wrist")),
     ],
 )
-def test_a_chain_or_a_part_of_the_tree_stands_and_weighs_where_pinocchio_has_it(
-    tmp_path, base, tip, names
-):
+def test_poses_and_weights_of_a_chain_agree_with_pinocchio(tmp_path, base, tip, names):
     path = written(tmp_path, *ARM)
     result = robot_from_urdf(path, base, tip)
     arm = through_its_file(result)
@@ -120,15 +118,15 @@ def test_a_chain_or_a_part_of_the_tree_stands_and_weighs_where_pinocchio_has_it(
 
 
 @pytest.mark.parametrize(
-    ("limits", "found"),
+    ("limits", "limits_found"),
     [
         (None, "no limits"),
         ((-1e16, 1e16), "no radians"),
         ((-170, 170), "limits of -170 to 170, no radians"),
     ],
 )
-def test_no_limits_and_those_that_are_no_radians_are_a_turn_either_way(
-    tmp_path, limits, found
+def test_limits_that_are_missing_or_not_in_radians_become_one_turn_either_way(
+    tmp_path, limits, limits_found
 ):
     free = written(
         tmp_path,
@@ -138,7 +136,7 @@ def test_no_limits_and_those_that_are_no_radians_are_a_turn_either_way(
     )
     result = robot_from_urdf(free, "a", "b")
     assert result.document["joint_limits_deg"] == [[-360.0, 360.0]]
-    assert any("'j' has" in note and found in note for note in result.notes)
+    assert any("'j' has" in note and limits_found in note for note in result.notes)
 
 
 TREE = (
@@ -158,7 +156,7 @@ def one_joint(*names, **more):
 
 
 @pytest.mark.parametrize(
-    ("parts", "links", "key", "words"),
+    ("parts", "links", "key", "fragments"),
     [
         (TREE, ("bas", "hand"), "base", ["'bas'", "'base'?"]),
         (TREE, ("base", "nothing"), "tip", ["'nothing'", "hand"]),
@@ -188,17 +186,23 @@ def one_joint(*names, **more):
         ),
     ],
 )
-def test_what_makes_no_chain_is_refused(tmp_path, parts, links, key, words):
+def test_links_that_make_no_chain_are_refused(tmp_path, parts, links, key, fragments):
     path = written(tmp_path, *parts)
-    with refused(path, key, *words):
+    with refused(path, key, *fragments):
         robot_from_urdf(path, *links)
 
 
 SOUND = (link("a"), link("b"), joint("j", "a", "b"))
 PLACE = 'xyz="0.0 0.0 0.0"'
 LAUGHS = "".join(f'<!ENTITY l{n} "{f"&l{n - 1};" * 10}">' for n in range(1, 10))
-BOMB = f'<?xml version="1.0"?><!DOCTYPE robot [<!ENTITY l0 "ha">{LAUGHS}]><robot name="&l9;"><link name="a"/></robot>'
-OUTSIDE = '<!DOCTYPE robot [<!ENTITY x SYSTEM "file:///etc/passwd">]><robot name="&x;"><link name="a"/></robot>'
+BOMB = (
+    f'<?xml version="1.0"?><!DOCTYPE robot [<!ENTITY l0 "ha">{LAUGHS}]>'
+    '<robot name="&l9;"><link name="a"/></robot>'
+)
+OUTSIDE = (
+    '<!DOCTYPE robot [<!ENTITY x SYSTEM "file:///etc/passwd">]>'
+    '<robot name="&x;"><link name="a"/></robot>'
+)
 
 
 def file_of(folder, text, encoding="utf-8"):
@@ -207,31 +211,34 @@ def file_of(folder, text, encoding="utf-8"):
     return path
 
 
-def test_meshes_and_what_else_is_no_joint_or_mass_is_left_out(tmp_path):
+def test_only_joints_and_masses_are_read(tmp_path):
     mesh = (
         '<visual><geometry><mesh filename="package://gone/x.stl"/></geometry></visual>'
     )
     heavy = link("b", 2.0, (0, 0, 1)).replace("</link>", mesh + "</link>")
-    found = read_urdf(
+    imported = read_urdf(
         file_of(
             tmp_path,
             robot(link("a"), heavy, SOUND[2], '<gazebo reference="a"/>', name="arm"),
         )
     )
-    assert found.name == "arm"
-    assert found.moments["b"].tolist() == [0, 0, 2, 2] and not found.moments["a"].any()
+    assert imported.name == "arm"
+    assert (
+        imported.moments["b"].tolist() == [0, 0, 2, 2]
+        and not imported.moments["a"].any()
+    )
 
 
 @pytest.mark.parametrize(
     "text", [BOMB, OUTSIDE], ids=["entities of entities", "an entity outside"]
 )
-def test_entities_are_refused_before_they_are_looked_at(tmp_path, text):
+def test_entities_are_refused_before_they_are_expanded(tmp_path, text):
     for encoding in ("utf-8", "utf-16"):
         with refused(tmp_path / "made.urdf", "", "<!DOCTYPE"):
             read_urdf(file_of(tmp_path, text, encoding))
 
 
-def test_more_than_a_urdf_can_have_is_refused_at_once(tmp_path, monkeypatch):
+def test_too_large_files_are_refused(tmp_path, monkeypatch):
     links = [link(f"l{number}") for number in range(2002)]
     joints = [
         joint(f"j{number}", f"l{number}", f"l{number + 1}") for number in range(2001)
@@ -251,7 +258,10 @@ def changed(old, new):
     return robot(*SOUND[:2], SOUND[2].replace(old, new))
 
 
-MACRO = '<robot name="x" xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="y"/></robot>'
+MACRO = (
+    '<robot name="x" xmlns:xacro="http://ros.org/wiki/xacro">'
+    '<xacro:include filename="y"/></robot>'
+)
 FAULTS = {
     "a macro": (MACRO, "", ["<xacro:include>", "run it first"]),
     "a property": (
@@ -291,18 +301,18 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_fault_is_one_line(tmp_path, fault):
-    text, key, words = FAULTS[fault]
-    with refused(tmp_path / "made.urdf", key, *words):
+def test_every_fault_is_reported_in_one_line(tmp_path, fault):
+    text, key, fragments = FAULTS[fault]
+    with refused(tmp_path / "made.urdf", key, *fragments):
         read_urdf(file_of(tmp_path, text))
 
 
 def weights(tmp_path, *parts, base="base", tip="hand"):
     """Entries of the robot file, and notes of what weighs."""
-    found = robot_from_urdf(written(tmp_path, *parts), base, tip)
-    words = ("zero for what", "placeholders", "gravity")
-    return found.document.get("masses", []), [
-        note for note in found.notes if any(word in note for word in words)
+    imported = robot_from_urdf(written(tmp_path, *parts), base, tip)
+    subjects = ("zero for what", "placeholders", "gravity")
+    return imported.document.get("masses", []), [
+        note for note in imported.notes if any(subject in note for subject in subjects)
     ]
 
 
@@ -319,7 +329,7 @@ FINGER = (
 )
 
 
-def test_what_moves_beside_the_chain_weighs_as_at_zero_and_beside_the_column_not_at_all(
+def test_side_branches_weigh_as_at_zero_and_moving_ones_on_the_column_not_at_all(
     tmp_path,
 ):
     masses, (note,) = weights(tmp_path, *FLANGED, *FINGER)
@@ -345,11 +355,11 @@ def test_equal_masses_are_placeholders(tmp_path):
     ]
     masses, notes = weights(tmp_path, *parts, base="a", tip="d")
     assert masses == [] and "2 kg: placeholders" in notes[0]
-    other, _ = weights(tmp_path, link("a", 2.1), *parts[1:], base="a", tip="d")
-    assert len(other) == 4
+    heavier, _ = weights(tmp_path, link("a", 2.1), *parts[1:], base="a", tip="d")
+    assert len(heavier) == 4
 
 
-def test_gravity_turns_with_a_base_that_does_not_stand_upright(tmp_path):
+def test_gravity_is_expressed_in_a_tilted_base(tmp_path):
     wall = (
         link("wall"),
         joint("bolts", "wall", "base", "fixed", rpy=(0, np.pi / 2, 0)),

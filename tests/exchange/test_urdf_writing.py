@@ -1,5 +1,4 @@
-"""The user's own URDF with joint origins changed and nothing else, as pinocchio has
-it."""
+"""Calibrated joint origins in the user's own URDF, against pinocchio."""
 
 from xml.etree import ElementTree as Xml
 
@@ -46,23 +45,23 @@ PARTS = (
 
 
 def calibrated_of(robot, seed=4):
-    places = range(1, robot.joints + 1)
-    known = candidates_on(build_sites(robot))
+    joints = range(1, robot.joints + 1)
+    candidates = candidates_on(build_sites(robot))
     keys = [
-        *(f"joint_offset@{place}" for place in places),
-        *(f"link_geometry@{place}" for place in places),
+        *(f"joint_offset@{joint}" for joint in joints),
+        *(f"link_geometry@{joint}" for joint in joints),
     ]
     made = make_calibrated_robot(
-        robot, *(key for key in keys if key in known), identified=False, seed=seed
+        robot, *(key for key in keys if key in candidates), identified=False, seed=seed
     )
     return fold_effects(made).robot
 
 
 def export_arm(path, robot, calibrated):
-    found = write_calibrated_origins(path, robot, calibrated)
+    corrected = write_calibrated_origins(path, robot, calibrated)
     output = path.with_name("robot.urdf")
-    output.write_bytes(found.content)
-    return output, found
+    output.write_bytes(corrected.content)
+    return output, corrected
 
 
 @pytest.fixture
@@ -73,9 +72,12 @@ def cell(tmp_path):
     return path, robot, calibrated_of(robot)
 
 
-def test_all_but_joint_origins_is_as_it_was(cell):
-    output, found = export_arm(*cell)
-    assert found.changed == 4 and (found.base, found.tip) == ("base", "tool0")
+def test_only_joint_origins_change(cell):
+    output, corrected = export_arm(*cell)
+    assert corrected.changed == 4 and (corrected.base, corrected.tip) == (
+        "base",
+        "tool0",
+    )
     assert_same_poses(cell[2], output, "base", "tool0")
 
     def elements(path):
@@ -85,16 +87,16 @@ def test_all_but_joint_origins_is_as_it_was(cell):
         )
         origins = {joint.find("origin") for joint in root.findall("joint")}
         return [
-            (str(each.tag)[:9], each.attrib, (each.text or "").strip())
-            for each in root.iter()
-            if each not in origins
+            (str(element.tag)[:9], element.attrib, (element.text or "").strip())
+            for element in root.iter()
+            if element not in origins
         ]
 
     assert elements(output) == elements(cell[0])
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "words"),
+    ("old", "new", "fragments"),
     [
         ('xyz="0.5 0.0 0.0"', 'xyz="0.5004 0 0"', "as the robot file has it"),
         ('name="a2"', 'name="axis_2"', "no chain to 'tool0' by rail, a1, a2"),
@@ -102,14 +104,14 @@ def test_all_but_joint_origins_is_as_it_was(cell):
         ('xyz="0.6 0.0 0.8"', 'xyz="-0.6 0 -0.8"', "as the robot file has it"),
     ],
 )
-def test_another_robots_file_is_refused(cell, old, new, words):
+def test_the_file_of_another_robot_is_refused(cell, old, new, fragments):
     path, robot, calibrated = cell
-    other = path.with_name("other.urdf")
-    other.write_text(
+    other_path = path.with_name("other.urdf")
+    other_path.write_text(
         path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8"
     )
-    with refused(other, words, "imported"):
-        write_calibrated_origins(other, robot, calibrated)
+    with refused(other_path, fragments, "imported"):
+        write_calibrated_origins(other_path, robot, calibrated)
 
 
 @settings(max_examples=10, deadline=None)

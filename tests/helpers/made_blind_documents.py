@@ -1,5 +1,5 @@
 """Ground truths, verdicts and oracles of blind cases as documents, without making any
-case; and the plan that counts them."""
+case; and the tables that are counted from them."""
 
 import pandas as pd
 from analysed_robots import ROBOTS
@@ -10,12 +10,20 @@ from elastocal_proof.blind.summary import summarize_figures
 
 PLAN = read_document(ROBOTS.parent / "blind.yaml")
 JOINTS = 6
+# Half width of the 95 % interval of a normal estimate, in standard errors.
+COVERAGE_FACTOR = 1.959964
 
 
-def truth(*places, group=None, level=50.0, robot="irb7600", setting="usual", **changes):
-    """A sealed document; a place is an effect with its joints, such as ("joint_offset",
-    3)."""
-    group = group or ("single" if places else "none")
+def make_truth(
+    *located_effects,
+    group=None,
+    level=50.0,
+    robot="irb7600",
+    setting="usual",
+    **changes,
+):
+    """Make a sealed document; a located effect is a tuple of its name and its joints,
+    such as ("joint_offset", 3)."""
     defects = [
         {
             "effect": effect,
@@ -25,16 +33,14 @@ def truth(*places, group=None, level=50.0, robot="irb7600", setting="usual", **c
             "signal": {"raw": 4 * level, "retained": level},
             "parameters": {},
         }
-        for effect, *joints in places
+        for effect, *joints in located_effects
     ]
-    effects = [effect for effect, *_ in places]
-    robots = "tuned" if robot in PLAN["tuned"] else "proof"
     case = {
-        "group": group,
+        "group": group or ("single" if located_effects else "none"),
         "robot": robot,
-        "robots": robots,
+        "robots": "tuned" if robot in PLAN["tuned"] else "proof",
         "setting": setting,
-        "effects": effects,
+        "effects": [defect["effect"] for defect in defects],
         "levels": [level] * len(defects),
     }
     return {
@@ -47,10 +53,10 @@ def truth(*places, group=None, level=50.0, robot="irb7600", setting="usual", **c
     } | changes
 
 
-def effect(name, *joints, parameters=(), alternatives=(), adopted=True):
-    """An effect of a verdict; a parameter is a name with its value and its standard
-    error."""
-    key = "@".join([name, "+".join(map(str, joints))] if joints else [name])
+def make_effect(name, *joints, parameters=(), alternatives=(), adopted=True):
+    """Make an effect of a verdict; a parameter is a tuple of its name, its value and its
+    standard error."""
+    key = f"{name}@{'+'.join(map(str, joints))}" if joints else name
     return {
         "name": name,
         "joints": list(joints),
@@ -58,18 +64,18 @@ def effect(name, *joints, parameters=(), alternatives=(), adopted=True):
         "adopted": adopted,
         "parameters": [
             {
-                "name": f"{key} {of}",
+                "name": f"{key} {parameter}",
                 "value": value,
-                "std_error": error,
-                "held": error == 0,
+                "std_error": std_error,
+                "held": std_error == 0,
             }
-            for of, value, error in parameters
+            for parameter, value, std_error in parameters
         ],
     }
 
 
-def verdict(
-    word,
+def make_verdict(
+    kind,
     *effects,
     before=2e-4,
     after=1e-4,
@@ -78,17 +84,17 @@ def verdict(
     compliance=1.0,
     freedom=0,
 ):
-    """A verdict as in verdict.json."""
+    """Make a verdict with the keys of verdict.json that the scores read."""
     return {
-        "verdict": word,
+        "verdict": kind,
         "effects": list(effects),
         "heldout": {
             "before": {"rms_m": before},
             "after": {"rms_m": after},
             "noise_floor_rms_m": 1e-4,
             "reduction_ci95": list(reduction),
-            # As the interval of a normal estimate has it.
-            "reduction_std_error": (reduction[1] - reduction[0]) / (2 * 1.959964),
+            "reduction_std_error": (reduction[1] - reduction[0])
+            / (2 * COVERAGE_FACTOR),
         },
         "noise": {"degrees_of_freedom": freedom},
         "repeatable": None,
@@ -101,16 +107,19 @@ def verdict(
     }
 
 
-def said(word, *names, alternatives=()):
-    """A verdict by its word and names."""
-    return verdict(word, *(effect(name, alternatives=alternatives) for name in names))
+def make_plain_verdict(kind, *names, alternatives=()):
+    """Make a verdict from its kind and the names of its effects."""
+    effects = [make_effect(name, alternatives=alternatives) for name in names]
+    return make_verdict(kind, *effects)
 
 
-def silence(**changes):
-    return verdict("adequate", before=1e-4, after=1e-4, reduction=(0.0, 0.0), **changes)
+def make_adequate_verdict(**changes):
+    return make_verdict(
+        "adequate", before=1e-4, after=1e-4, reduction=(0.0, 0.0), **changes
+    )
 
 
-def oracle(p_value=1e-6, rms=1e-4):
+def make_oracle(p_value=1e-6, rms=1e-4):
     return {
         "candidates": [],
         "p_value": p_value,
@@ -119,21 +128,17 @@ def oracle(p_value=1e-6, rms=1e-4):
     }
 
 
-def frame(*entries):
-    """Rows of cases.csv of (ground truth, verdict, oracle), with a limit behind them
-    where there is one."""
+def tabulate_cases(*entries):
+    """Tabulate rows of cases.csv; an entry is a tuple of a ground truth, a verdict, an
+    oracle and, if there is one, a limit."""
     return pd.DataFrame([build_case_row(PLAN, *entry) for entry in entries])
 
 
-def summary(*entries):
-    """The summary of such entries by robots and quantity."""
-    spans = pd.DataFrame(
-        [
-            row
-            for document, found, *_ in entries
-            for row in list_intervals(document, found)
-        ]
-    )
-    return summarize_figures(PLAN, frame(*entries), spans, 1).set_index(
-        ["robots", "quantity"]
-    )
+def summarize_entries(*entries):
+    """Summarize entries of `tabulate_cases`, by robots and quantity."""
+    intervals = []
+    for truth, verdict, *_ in entries:
+        intervals += list_intervals(truth, verdict)
+    cases = tabulate_cases(*entries)
+    summary = summarize_figures(PLAN, cases, pd.DataFrame(intervals), 1)
+    return summary.set_index(["robots", "quantity"])

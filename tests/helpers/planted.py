@@ -1,5 +1,5 @@
-"""Small campaigns of a known robot that lacks what is planted in it, fitted without
-that."""
+"""Small campaigns of a robot with known effects, and the fit of a model without these
+effects."""
 
 from dataclasses import dataclass, replace
 
@@ -18,16 +18,23 @@ from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import Fit, fit_model
 from elastocal.fitting.observations import Observations
 
-# At known places, so that nothing but the effects is to be identified.
+# The offsets of these targets are known, so that only the effects are identified.
 HAND = (Target("hand", "6DoF", (0.1, 0.05, 0.02)),)
 ELBOW_AND_HAND = (Target("elbow", "3DoF", (0.0, 0.1, 0.05)), *HAND)
 
 
 @dataclass(frozen=True)
 class Planted:
-    """A campaign whose ground truth is known.
+    """A campaign with known effects.
 
-    `declared`: of the model that lacks what was planted.
+    Attributes
+    ----------
+    declared : Fit
+        Fit of the model without these effects.
+    observations : Observations
+        Measurements.
+    candidates : dict
+        Candidates of the robot by key.
     """
 
     declared: Fit
@@ -40,27 +47,34 @@ class Planted:
 
 
 def two_loads_a_pose(joints, poses, seed, force=800.0):
-    """States of `poses` poses, each unloaded and under a load of its own."""
+    """Make states of some poses, each without a load and under a load of its own."""
     states = make_states(joints, 2 * poses, seed, force)
-    wrench = states.wrench * (np.arange(2 * poses) % 2)[:, None]
+    load = np.arange(2 * poses) % 2
     pose = np.arange(2 * poses) // 2
     return replace(
         states,
         pose=pose,
-        load=np.arange(2 * poses) % 2,
+        load=load,
         joint_angles=states.joint_angles[2 * pose],
         approach=states.approach[2 * pose],
-        wrench=wrench,
+        wrench=states.wrench * load[:, None],
     )
 
 
 def planted(
     robot, sizes, seed=0, poses=25, targets=ELBOW_AND_HAND, states=None, **model
 ):
-    """A campaign of positions and, by default, identified compliances.
+    """Make a campaign of positions, by default with identified compliances.
 
-    `sizes`: what is planted: parameters by the key of a candidate. `**model`: as in
-    `synthetic.made_model`.
+    Parameters
+    ----------
+    robot : robot that is measured
+    sizes : parameters of the effects, by the keys of their candidates
+    seed : seed of the states, the parameters and the noise
+    poses : number of poses, if `states` is None
+    targets : targets of the tracker
+    states : states to measure; each pose without and with a load if None
+    **model : as in `synthetic.make_model`
     """
     settings = {
         "fitted_frames": False,
@@ -68,20 +82,20 @@ def planted(
         "compliance": robot.compliance,
     } | model
     declared = make_model(robot.chain, targets, **settings)
-    states = (
-        two_loads_a_pose(declared.sites.joints, poses, (5, seed))
-        if states is None
-        else states
-    )
+    joints = declared.sites.joints
+    if states is None:
+        states = two_loads_a_pose(joints, poses, (5, seed))
     candidates = candidates_on(declared.sites)
     start = make_estimate(declared, seed=seed)
     if declared.identifies_compliance:
         start = replace(start, coefficients=(robot.compliance, *start.coefficients[1:]))
     added = [candidates[key] for key in sizes]
-    true = start.with_effects(added)
-    for number, size in enumerate(sizes.values()):
-        true.coefficients[len(start.coefficients) + number][:] = size
-    seen = observe_exactly(declared.with_effects(added), true, states)
-    seen = add_noise(seen, np.random.default_rng((6, seed)))
-    noise = replace(NOISE, joint_rad=np.zeros(declared.sites.joints))
-    return Planted(fit_model(declared, seen, noise, start), seen, candidates)
+    truth = start.with_effects(added)
+    first_added = len(start.coefficients)
+    for index, size in enumerate(sizes.values(), first_added):
+        truth.coefficients[index][:] = size
+    observations = observe_exactly(declared.with_effects(added), truth, states)
+    observations = add_noise(observations, np.random.default_rng((6, seed)))
+    noise = replace(NOISE, joint_rad=np.zeros(joints))
+    fitted = fit_model(declared, observations, noise, start)
+    return Planted(fitted, observations, candidates)

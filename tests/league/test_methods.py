@@ -120,10 +120,10 @@ def large_round(kuka, robots_folder, tmp_path_factory):
 
 
 def test_a_fit_of_frames_has_no_parameters_of_the_robot(large_round):
-    owners_of_frames, owners_of_geometry = (
-        {owner for owner, _ in fit_physics(physics, large_round[0]).parameters}
-        for physics in (FRAMES, GEOMETRY)
-    )
+    frames = fit_physics(FRAMES, large_round[0])
+    geometry = fit_physics(GEOMETRY, large_round[0])
+    owners_of_frames = {owner for owner, _ in frames.parameters}
+    owners_of_geometry = {owner for owner, _ in geometry.parameters}
     assert all(owner.startswith(("frame ", "target ")) for owner in owners_of_frames)
     effects = {
         owner.partition("@")[0] for owner in owners_of_geometry - owners_of_frames

@@ -13,7 +13,14 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from made_blind_documents import PLAN, effect, frame, oracle, truth, verdict
+from made_blind_documents import (
+    PLAN,
+    make_effect,
+    make_oracle,
+    make_truth,
+    make_verdict,
+    tabulate_cases,
+)
 from made_leagues import make_entries
 
 from elastocal.io.data_frames import write_csv
@@ -47,7 +54,7 @@ def made_tables():
     """Make all tables, by the names of their golden files."""
     # No run has robots that were used for tuning beside others.
     entries = [entry for entry in _cases() if entry[0]["case"]["robots"] == "proof"]
-    cases = frame(*entries)
+    cases = tabulate_cases(*entries)
     spans = pd.DataFrame(
         [
             row
@@ -94,14 +101,14 @@ def _cases():
         document = _ground_truth(number, group, level)
         stated = _verdict(number, document, draws, is_right=is_right)
         stated |= {"campaign": document["campaign"]}
-        yield document, stated, oracle(rms=1e-4 * (1 + 0.02 * draws.random()))
+        yield document, stated, make_oracle(rms=1e-4 * (1 + 0.02 * draws.random()))
 
 
 def _ground_truth(number, group, level):
     joint = 1 + number % 6
     kind = "outside:slipping_zero" if group == "outside" else "joint_offset"
     has_defect = group != "none" and number % 18 != 2
-    document = truth(
+    document = make_truth(
         *([(kind, joint)] if has_defect else []),
         group=group,
         level=level,
@@ -116,7 +123,7 @@ def _ground_truth(number, group, level):
 
 def _verdict(number, document, draws, *, is_right):
     size = 1e-4 * (1 + 0.3 * draws.standard_normal())
-    named = effect(
+    named = make_effect(
         "joint_offset" if is_right else "payload",
         1 + number % 6,
         parameters=[("offset", size, 3e-5)],
@@ -126,7 +133,7 @@ def _verdict(number, document, draws, *, is_right):
     kind = "class" if number % 7 == 0 else "named"
     effects = [] if is_adequate else [named]
     after = 1e-4 * (1 + 0.1 * draws.random())
-    stated = verdict(
+    stated = make_verdict(
         "adequate" if is_adequate else kind,
         *effects,
         after=after,

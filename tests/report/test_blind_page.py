@@ -3,13 +3,13 @@
 import pandas as pd
 from made_blind_documents import (
     PLAN,
-    effect,
-    frame,
-    oracle,
-    said,
-    silence,
-    truth,
-    verdict,
+    make_adequate_verdict,
+    make_effect,
+    make_oracle,
+    make_plain_verdict,
+    make_truth,
+    make_verdict,
+    tabulate_cases,
 )
 
 from elastocal_proof.blind.summary import summarize_by_robot, summarize_figures
@@ -26,17 +26,17 @@ def split_cells(row):
 
 def test_each_quantity_has_its_target_its_limit_and_a_column_for_each_robot():
     pairs = [
-        truth(("payload",), ("joint_tilt", 2), group="pair", robot=robot)
+        make_truth(("payload",), ("joint_tilt", 2), group="pair", robot=robot)
         for robot in ("irb7600", "gen3")
     ]
-    both = verdict("several", effect("payload"), effect("joint_tilt", 2))
+    both = make_verdict("several", make_effect("payload"), make_effect("joint_tilt", 2))
     best = {"detected": True, "right": True}
     entries = [
-        (pairs[0], both, oracle(), best),
-        (pairs[1], said("named", "payload"), oracle(), best),
-        (pairs[1], both, oracle()),
+        (pairs[0], both, make_oracle(), best),
+        (pairs[1], make_plain_verdict("named", "payload"), make_oracle(), best),
+        (pairs[1], both, make_oracle()),
     ]
-    cases = frame(*entries)
+    cases = tabulate_cases(*entries)
     summary = summarize_figures(PLAN, cases, pd.DataFrame(), 1)
     alone = summarize_by_robot(PLAN, cases, 1)
     page = format_targets_page(
@@ -75,12 +75,22 @@ def test_each_quantity_has_its_target_its_limit_and_a_column_for_each_robot():
 
 def test_the_number_of_reached_targets_names_the_robots():
     fine = summarize_figures(
-        PLAN, frame(*[(truth(), silence(), oracle(1.0))] * 100), pd.DataFrame(), 1
+        PLAN,
+        tabulate_cases(
+            *[(make_truth(), make_adequate_verdict(), make_oracle(1.0))] * 100
+        ),
+        pd.DataFrame(),
+        1,
     )
     assert describe_reached_targets(fine).endswith(
         "with a target reach it on the robots of the proof."
     )
     tuned = summarize_figures(
-        PLAN, frame((truth(robot="kuka"), silence(), oracle(1.0))), pd.DataFrame(), 1
+        PLAN,
+        tabulate_cases(
+            (make_truth(robot="kuka"), make_adequate_verdict(), make_oracle(1.0))
+        ),
+        pd.DataFrame(),
+        1,
     )
     assert "which proves nothing" in describe_reached_targets(tuned)

@@ -1,5 +1,2 @@
-"""Faults of the data, looked for before any physics: units, signs, frames,
-permutations; and what a campaign is warned of.
-
-Imports `fitting` and what that imports.
-"""
+"""Faults of the data, which are checked before any physics: units, signs, frames and
+permutations; and warnings about a campaign."""

@@ -1,13 +1,14 @@
-"""Every fault of the data, sought before any physics: constant columns, other
-interpretations, loads, nonsense.
+"""Find faults of the data before any physics: constant columns, other interpretations of
+the file, wrong loads, implausible measurements.
 
-Where it is ambiguous none is found: a false alarm stops a trace that was right, a miss
-only leaves it to what comes after. What stops nothing is a warning.
+In ambiguous cases no fault is reported: a false alarm stops a diagnosis that was right,
+while a missed fault only leaves the data to later steps. Findings that do not stop a
+diagnosis are warnings.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,46 +35,51 @@ from elastocal.mechanics.elastostatics import (
 from elastocal.mechanics.kinematics import compute_jacobians, compute_position_jacobians
 
 if TYPE_CHECKING:
-    from elastocal.campaigns.campaign import Campaign
+    from collections.abc import Iterator
+
+    from elastocal.campaigns.campaign import Campaign, Measurements
+    from elastocal.data_checks.placement import Placement
     from elastocal.fitting.least_squares import Fit
 
-# Below the last digit that any sensor writes (0.1 µm) and any controller reports (1e-6
-# rad or so).
+# Changes below these are below the last digit of sensors (0.1 µm) and controllers (about
+# 1e-6 rad): the values are the same.
 _SAME_M = 1e-6
 _SAME_RAD = 1e-6
-_FEWEST_POSES = 3
-# Five times what no geometric error and no deflection makes.
-_FARTHEST_M = 5 * IMPLAUSIBLE_M
-_FARTHEST_RAD = 5 * IMPLAUSIBLE_RAD
-# Compliances of a robot and those published for its make differ by up to two or so;
-# five is a unit, a sign or another effect that was taken for a joint's. What is usual
-# for a robot's size is itself known to a factor of five.
-_MOST_OFF_NOMINAL = 5.0
-_MOST_OFF_USUAL = 25.0
+_MIN_POSES = 3
+# Measurements this far from the nominal robot are implausible: five times more than
+# geometric errors and deflections cause.
+_MAX_DISTANCE_M = 5 * IMPLAUSIBLE_M
+_MAX_ROTATION_RAD = 5 * IMPLAUSIBLE_RAD
+# Largest ratio of an identified compliance and its reference. Compliances of a robot and
+# published ones of its make differ by up to two or so; a factor of five is a unit, a sign
+# or another effect that was taken for a joint's. The usual value for a robot's size is
+# itself known to a factor of five.
+_MAX_NOMINAL_RATIO = 5.0
+_MAX_USUAL_RATIO = 25.0
 _RIGID = (
-    "the robot file states no joint compliances: the joints are taken as rigid, and do not yield to the weights that it may"
-    " state; load the robot and set compliance to identify, or state them"
+    "the robot file states no joint compliances: the joints are taken as rigid, and do"
+    " not yield to the weights that it may state; load the robot and set compliance to"
+    " identify, or state them"
 )
-# No robot goes where its nominal kinematics are to less: a tenth of what good robots
-# are off. Rounding to 0.001° is less.
-_NO_ROBOT_M = 3e-5
-
-# Poses that loads are judged by.
-_MOST_LOADED = 150
-_FEWEST_LOADED = 4
-# Compliances of a robot and those of its data sheet differ by no more, all together;
-# one between a third and three times is nobody's unit.
-_RATIO = 1.7
-# Share of the deflections that loads as written must leave, and share of that which
-# corrected loads may leave.
-_UNEXPLAINED = 0.5
-# Units that explain the deflections as well as each other, but for so much, are
-# distinguished by the compliances alone.
-_AS_WELL = 1.1
-# Below this share of their square, loads of one pose do not differ.
-_DIFFERING = 1e-6
-# Newtons and newton metres for each unit in which loads may have been written, and the
-# words for it.
+# No robot follows its nominal kinematics this closely: a tenth of the errors of good
+# robots. Rounding of angles to 0.001° causes less.
+_MIN_ROBOT_ERROR_M = 3e-5
+# Upper and lower bound on the poses that judge loads.
+_MAX_LOADED_POSES = 150
+_MIN_LOADED_POSES = 4
+# Upper bound on the common ratio of a robot's compliances and those of its data sheet.
+# No unit has a factor between a third and three.
+_MAX_COMMON_RATIO = 1.7
+# Share of the deflections that loads as written must leave unexplained, and share of that
+# residual that corrected loads may leave.
+_UNEXPLAINED_SHARE = 0.5
+# Units whose residuals differ by less than this factor explain the deflections equally
+# well; the compliances alone distinguish them.
+_EQUIVALENT_RATIO = 1.1
+# Loads of a pose do not differ if their squared deviations are below this share.
+_MIN_DIFFERENCE_SHARE = 1e-6
+# Newtons and newton metres for each unit in which loads may have been written, and a
+# sentence about it.
 LOAD_UNITS = (
     (1.0, 1.0, ""),
     (
@@ -109,7 +115,8 @@ LOAD_UNITS = (
     (
         1.0,
         1e-3,
-        "the moments look like newton millimetres: measurements fit a thousandth of the written moments",
+        "the moments look like newton millimetres: measurements fit a thousandth of"
+        " the written moments",
     ),
     (
         1e3,
@@ -125,268 +132,301 @@ LOAD_UNITS = (
 
 
 def find_faults(campaign: Campaign) -> tuple[Fault, ...]:
-    """Every fault that the measurements of a campaign show; none is looked for where
-    another one makes that meaningless."""
+    """Find the faults that the measurements of a campaign show.
+
+    A check is skipped if a fault that was already found makes it meaningless.
+    """
     for find in (find_constant_columns, find_better_interpretation):
-        if found := find(campaign):
-            return tuple(found)
+        faults = find(campaign)
+        if faults:
+            return tuple(faults)
     differences = compute_deflections(campaign)
-    return (
-        *(find_wrong_loads(*differences) if differences else ()),
-        *find_implausible_measurements(campaign),
-    )
+    load_faults = find_wrong_loads(*differences) if differences else []
+    return (*load_faults, *find_implausible_measurements(campaign))
 
 
 def find_constant_columns(campaign: Campaign) -> list[Fault]:
-    """Positions that stay where they are while the robot moves, or joint angles that do
-    not while the measurements do.
+    """Find positions that do not change while the robot moves, or joint angles that do
+    not change while the measurements do.
 
-    Returns one for each kind, of the first target that shows it.
+    Returns one fault of each kind, of the first target that shows it.
     """
-    some = select_spread_poses(campaign).measurements
-    predicted = place_measurements(select_spread_poses(campaign)).predicted
-    found: dict[str, Fault] = {}
-    for members in group_by_target(some):
-        if (poses := len(np.unique(some.pose[members]))) < _FEWEST_POSES:
+    subset = select_spread_poses(campaign)
+    measurements = subset.measurements
+    predicted = place_measurements(subset).predicted
+    faults: dict[str, Fault] = {}
+    for members in group_by_target(measurements):
+        rows = measurements.select(members)
+        poses = len(np.unique(rows.pose))
+        if poses < _MIN_POSES:
             continue
-        measured = some.position[members]
-        who = campaign.targets[some.target[members[0]]].name
-        kinds = {}
-        # Standard deviations along the main axes, the smallest first: a plane seen in
-        # its own axes has one constant column.
-        needed = _extents(predicted[members])
-        moved = _extents(measured)[-1]
-        still = np.ptp(measured, axis=0) < _SAME_M
-        if still.any() and needed[still.sum() - 1] > IMPLAUSIBLE_M:
-            axes = ", ".join(np.array(list("xyz"))[still])
-            verb = "are" if still.sum() > 1 else "is"
-            where = "zero" if not measured[:, still].any() else "the same"
-            detail = f"{axes} of {who} {verb} {where} in all {poses} poses, though by its joint angles the robot moved"
-            kinds[axes] = detail, needed[-1]
-        if (
-            np.ptp(some.joint_angles[members], axis=0).max() < _SAME_RAD
-            and moved > IMPLAUSIBLE_M
-        ):
-            same = f"the joint angles are the same in all {poses} poses"
-            kinds["angles"] = (
-                f"{same}, though the measurements of {who} lie {moved:.2g} m apart",
-                moved,
-            )
+        name = campaign.targets[rows.target[0]].name
         count = (Value("poses", float(poses), "–"),)
-        for kind, (detail, size) in kinds.items():
-            found.setdefault(
-                kind, Fault("constant_columns", (), detail, count, (float(size), 0.0))
-            )
-    return list(found.values())
+        extents = _principal_extents(predicted[members])
+        for kind, detail, size_m in _describe_constant(rows, extents, name, poses):
+            evidence = float(size_m), 0.0
+            fault = Fault("constant_columns", (), detail, count, evidence)
+            faults.setdefault(kind, fault)
+    return list(faults.values())
 
 
-def _extents(points: np.ndarray) -> np.ndarray:
-    """Standard deviations of points along their principal axes, rising, ndarray (3,),
-    m."""
-    off = points - points.mean(axis=0)
-    return np.sqrt(np.maximum(np.linalg.eigvalsh(off.T @ off / len(points)), 0.0))
+def _describe_constant(
+    rows: Measurements, expected_m: np.ndarray, name: str, poses: int
+) -> Iterator[tuple[str, str, float]]:
+    """Kind, sentence and expected size, m, of the columns of one target that are
+    constant; `expected_m` (3,) are the extents that the joint angles imply."""
+    # Extents ascend: a plane that is seen in its own axes has one constant column.
+    constant = np.ptp(rows.position, axis=0) < _SAME_M
+    if constant.any() and expected_m[constant.sum() - 1] > IMPLAUSIBLE_M:
+        axes = ", ".join(np.array(list("xyz"))[constant])
+        verb = "are" if constant.sum() > 1 else "is"
+        value = "the same" if rows.position[:, constant].any() else "zero"
+        detail = (
+            f"{axes} of {name} {verb} {value} in all {poses} poses, "
+            "though by its joint angles the robot moved"
+        )
+        yield axes, detail, expected_m[-1]
+    measured_m = _principal_extents(rows.position)[-1]
+    angle_range = np.ptp(rows.joint_angles, axis=0).max()
+    if angle_range < _SAME_RAD and measured_m > IMPLAUSIBLE_M:
+        detail = (
+            f"the joint angles are the same in all {poses} poses, "
+            f"though the measurements of {name} lie {measured_m:.2g} m apart"
+        )
+        yield "angles", detail, measured_m
+
+
+def _principal_extents(points: np.ndarray) -> np.ndarray:
+    """Ascending standard deviations of points along their principal axes, (3,), m."""
+    deviations = points - points.mean(axis=0)
+    variances = np.linalg.eigvalsh(deviations.T @ deviations / len(points))
+    return np.sqrt(np.maximum(variances, 0.0))
 
 
 def compute_deflections(campaign: Campaign) -> tuple[np.ndarray, np.ndarray] | None:
-    """Differences between the loads of each pose: those seen (R,), and those expected
-    of forces and of moments (R, 2), m.
+    """Compute differences of the deflections under the loads of each pose.
 
-    Rows are coordinates of measurements. Frames, targets and geometry are taken off as
-    means of each target in each pose (within transformation). None where loads do not
-    differ within poses, compliances are not known or poses are too few.
+    Frames, targets and geometry cancel, because the mean of each target in each pose is
+    subtracted (within transformation).
+
+    Returns
+    -------
+    measured, expected : (R,) and (R, 2) arrays, m
+        Rows are coordinates of measurements. Expected deflections are those by forces
+        and by moments. None if loads do not differ within poses, if compliances are
+        unknown, or with too few poses.
     """
     pose = index_poses(campaign.measurements)
-    loaded = campaign.robot.compliance_known and campaign.measurements.wrench.any()
-    if not loaded or pose.max() + 1 < _FEWEST_LOADED:
+    is_loaded = campaign.robot.compliance_known and campaign.measurements.wrench.any()
+    if not is_loaded or pose.max() + 1 < _MIN_LOADED_POSES:
         return None
-    measurements = campaign.measurements.select(
-        np.isin(pose, np.linspace(0, pose.max(), _MOST_LOADED).round().astype(int))
-    )
-    campaign, chain = replace(campaign, measurements=measurements), campaign.robot.chain
-    # Frames and targets from the lowest loads: those of a wrong unit must not enter.
-    whole = place_measurements(
-        campaign, place_robustly(select_spread_poses(campaign)).estimate
-    )
-    targets = zip(campaign.targets, whole.estimate.target_offset, strict=True)
+    chosen = np.linspace(0, pose.max(), _MAX_LOADED_POSES).round().astype(int)
+    measurements = campaign.measurements.select(np.isin(pose, chosen))
+    campaign = replace(campaign, measurements=measurements)
+    # Frames and targets from the lowest loads, because loads in a wrong unit must not
+    # enter them.
+    robust = place_robustly(select_spread_poses(campaign)).estimate
+    placement = place_measurements(campaign, robust)
+    group = group_equal_rows(
+        np.column_stack([index_poses(measurements), measurements.target])
+    )[1]
+    measured = placement.measured[0] - placement.predicted
+    expected = _expect_deflections(campaign, placement)
+    rows = np.stack([measured, *expected], axis=-1)
+    totals = np.zeros((group.max() + 1, *rows.shape[1:]))
+    np.add.at(totals, group, rows)
+    differences = rows - (totals / np.bincount(group)[:, None, None])[group]
+    square = (rows[..., 1:] ** 2).sum()
+    if (differences[..., 1:] ** 2).sum() <= _MIN_DIFFERENCE_SHARE * square:
+        return None
+    return differences[..., 0].ravel(), differences[..., 1:].reshape(-1, 2)
+
+
+def _expect_deflections(campaign: Campaign, placement: Placement) -> list[np.ndarray]:
+    """Deflections of the targets by forces and by moments at nominal compliance, two
+    (N, 3) arrays, m."""
+    chain = campaign.robot.chain
+    measurements = campaign.measurements
+    offsets = placement.estimate.target_offset
     points = [
-        replace(chain.point(target.point), offset_m=tuple(at)) for target, at in targets
+        replace(chain.point(target.point), offset_m=tuple(offset))
+        for target, offset in zip(campaign.targets, offsets, strict=True)
     ]
     jacobian = compute_position_jacobians(
         chain, measurements.joint_angles, points, measurements.target
     )
-    end = compute_jacobians(
+    end_jacobian = compute_jacobians(
         chain,
         measurements.joint_angles,
         replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0)),
     )
-    torques = [
-        compute_generalized_forces(
-            end, measurements.wrench * (np.arange(6) // 3 == part)
+    deflections = []
+    for is_part in (np.arange(6) < 3, np.arange(6) >= 3):
+        torques = compute_generalized_forces(
+            end_jacobian, measurements.wrench * is_part
         )
-        for part in (0, 1)
-    ]
-    expected = [
-        build_regressor(jacobian, each) @ campaign.robot.compliance for each in torques
-    ]
-    group = group_equal_rows(
-        np.column_stack([index_poses(measurements), measurements.target])
-    )[1]
-    rows = np.stack([whole.measured[0] - whole.predicted, *expected], axis=-1)
-    mean = np.zeros((group.max() + 1, *rows.shape[1:]))
-    np.add.at(mean, group, rows)
-    off = rows - (mean / np.bincount(group)[:, None, None])[group]
-    if (off[..., 1:] ** 2).sum() <= _DIFFERING * (rows[..., 1:] ** 2).sum():
-        return None
-    return off[..., 0].ravel(), off[..., 1:].reshape(-1, 2)
+        regressor = build_regressor(jacobian, torques)
+        deflections.append(regressor @ campaign.robot.compliance)
+    return deflections
 
 
-def find_wrong_loads(seen: np.ndarray, expected: np.ndarray) -> list[Fault]:
-    """The sign and the unit that explain deflections, see `deflections`, far better
-    than the loads as written, if any do.
+def find_wrong_loads(measured: np.ndarray, expected: np.ndarray) -> list[Fault]:
+    """Find the sign and the unit that explain deflections far better than the loads as
+    written.
 
-    Of units that explain them as well, the one that brings the compliances nearest to
-    the nominal ones, beside the next one.
+    Of units that explain them equally well, the unit whose compliances are closest to
+    the nominal ones is reported; the next one is its alternative. Arguments are those of
+    `compute_deflections`.
     """
     as_written = expected.sum(axis=1)
-    before, share, _ = _left(seen, as_written)
-    found = []
+    before, share_before, _ = _compare_deflections(measured, as_written)
+    if share_before < _UNEXPLAINED_SHARE:
+        return []
+    candidates = []
     for force, moment, detail in LOAD_UNITS:
         corrected = expected @ (force, moment)
-        sign = float(np.sign(corrected @ seen))
-        after, share_after, off = _left(seen, sign * corrected)
-        if share >= _UNEXPLAINED and share_after <= _UNEXPLAINED * share:
-            found.append((off, after, sign, force, moment, detail))
-    as_well = sorted(
-        each for each in found if each[1] <= _AS_WELL * min(other[1] for other in found)
-    )
-    if not as_well:
+        sign = float(np.sign(corrected @ measured))
+        after, share, ratio = _compare_deflections(measured, sign * corrected)
+        if share <= _UNEXPLAINED_SHARE * share_before:
+            candidates.append(_LoadUnit(ratio, after, sign, force, moment, detail))
+    if not candidates:
         return []
-    (_, after, sign, force, moment, detail), *others = as_well
-    slope = Value(
-        "deflection over the one expected",
-        float(as_written @ seen / (as_written @ as_written)),
-        "–",
-    )
+    limit = _EQUIVALENT_RATIO * min(unit.residual_m for unit in candidates)
+    equivalent = sorted(unit for unit in candidates if unit.residual_m <= limit)
+    slope = float(as_written @ measured / (as_written @ as_written))
+    return _report_wrong_loads(equivalent, before, slope)
+
+
+@dataclass(frozen=True, order=True)
+class _LoadUnit:
+    """A unit and sign of loads that explain deflections; the first has the compliances
+    that are closest to the nominal ones."""
+
+    log_ratio: float
+    residual_m: float
+    sign: float
+    force: float
+    moment: float
+    detail: str
+
+
+def _report_wrong_loads(
+    units: list[_LoadUnit], before_m: float, slope: float
+) -> list[Fault]:
+    """Faults of the first unit, with the next one as an alternative."""
+    best = units[0]
+    evidence = before_m, best.residual_m
+    ratio = Value("deflection over the one expected", slope, "–")
     faults = []
-    if sign < 0:
-        turned = "the loads fit turned round, as if they were written as what the robot does to its surroundings"
-        faults.append(Fault("wrong_sign", (), turned, (slope,), (before, after)))
-    if detail:
-        units = (
-            Value("newtons for each unit of force written", force, "N"),
-            Value("newton metres for each unit of moment written", moment, "N m"),
+    if best.sign < 0:
+        detail = (
+            "the loads fit turned round, as if they were written as what the robot does"
+            " to its surroundings"
         )
-        less_likely = tuple(other[-1] for other in others[:1])
+        faults.append(Fault("wrong_sign", (), detail, (ratio,), evidence))
+    if best.detail:
+        parameters = (
+            Value("newtons for each unit of force written", best.force, "N"),
+            Value("newton metres for each unit of moment written", best.moment, "N m"),
+            ratio,
+        )
+        alternatives = tuple(unit.detail for unit in units[1:2])
         faults.append(
-            Fault(
-                "wrong_unit",
-                (),
-                detail,
-                (*units, slope),
-                (before, after),
-                alternatives=less_likely,
-            )
+            Fault("wrong_unit", (), best.detail, parameters, evidence, alternatives)
         )
     return faults
 
 
-def _left(seen: np.ndarray, expected: np.ndarray) -> tuple[float, float, float]:
-    """What expected deflections (R,), times the best factor that robots have, leave of
-    those seen: RMS in m, and share up to 1.
+def _compare_deflections(
+    measured: np.ndarray, expected: np.ndarray
+) -> tuple[float, float, float]:
+    """Compare measured deflections (R,) with expected ones times the best plausible ratio
+    of compliances.
 
-    The share is of those expected where they are the larger: the same for loads written
-    too small and too large. The last is how far that factor is from 1, of its
-    logarithm.
+    Returns the RMS residual, m; its share of the larger of both deflections, at most 1,
+    so that loads in too small and too large units are treated alike; and the magnitude
+    of the logarithm of the ratio.
     """
-    factor = np.clip(expected @ seen / (expected @ expected), 1 / _RATIO, _RATIO)
-    left = root_mean_square(seen - factor * expected)
-    return (
-        left,
-        min(
-            left / max(root_mean_square(seen), factor * root_mean_square(expected)), 1.0
-        ),
-        float(abs(np.log(factor))),
+    ratio = np.clip(
+        expected @ measured / (expected @ expected),
+        1 / _MAX_COMMON_RATIO,
+        _MAX_COMMON_RATIO,
     )
+    residual = root_mean_square(measured - ratio * expected)
+    size = max(root_mean_square(measured), ratio * root_mean_square(expected))
+    return residual, min(residual / size, 1.0), float(abs(np.log(ratio)))
 
 
 def find_implausible_measurements(campaign: Campaign) -> list[Fault]:
-    """Measurements absurdly far from the nominal robot, for a reason that no other
-    fault names; one fault, or none."""
-    # Nearly all campaigns are done with the first, which takes a sixth of the time.
+    """Find measurements that are absurdly far from the nominal robot for a reason that no
+    other fault names; at most one fault."""
+    subset = select_spread_poses(campaign)
+    # The first placement suffices for nearly all campaigns and takes a sixth of the time.
     for place in (place_measurements, place_robustly):
-        placement = place(select_spread_poses(campaign))
-        away, turned = map(float, placement.misfit)
-        if away < _FARTHEST_M and turned < _FARTHEST_RAD:
+        placement = place(subset)
+        distance, angle = map(float, placement.misfit)
+        if distance < _MAX_DISTANCE_M and angle < _MAX_ROTATION_RAD:
             return []
-    what = (
-        f"positions lie {away:.2g} m"
-        if away >= _FARTHEST_M
-        else f"orientations lie {turned:.2g} rad"
-    )
+    misfit = f"orientations lie {angle:.2g} rad"
+    if distance >= _MAX_DISTANCE_M:
+        misfit = f"positions lie {distance:.2g} m"
     detail = (
-        f"{what} (RMS) from where the robot file puts them, and no other sense, unit, axis, frame or order of rows that was"
-        " tried mends it: chain, zeros of the joints, measuring points and columns need a look"
+        f"{misfit} (RMS) from where the robot file puts them, and no other sense, unit,"
+        " axis, frame or order of rows that was tried mends it: chain, zeros of the"
+        " joints, measuring points and columns need a look"
     )
     parameters = (
-        Value("RMS distance of positions", away, "m"),
-        Value("RMS turn of orientations", turned, "rad"),
+        Value("RMS distance of positions", distance, "m"),
+        Value("RMS turn of orientations", angle, "rad"),
     )
-    return [
-        Fault(
-            "implausible_measurements",
-            (),
-            detail,
-            parameters,
-            (root_mean_square(placement.distance),) * 2,
-        )
-    ]
+    rms = root_mean_square(placement.distance)
+    return [Fault("implausible_measurements", (), detail, parameters, (rms, rms))]
 
 
 def warn_of_compliances(fitted: Fit) -> list[str]:
-    """Name the identified joint compliances of a fit that are negative, or far off
-    nominal either way, in one sentence.
+    """Warn of identified joint compliances that are negative or far from their reference.
 
-    None where measurements are wrong by centimetres: compliances mean nothing there.
-    Where they are neither identified nor known, that the joints are taken as rigid.
+    There is no warning if measurements are wrong by centimetres, because compliances
+    mean nothing then. If compliances are neither identified nor known, the warning says
+    that the joints are taken as rigid.
     """
     model = fitted.model
     if not model.identifies_compliance:
         return [] if model.compliance_known else [_RIGID]
-    if root_mean_square(np.linalg.norm(fitted.residual[:, :3], axis=1)) > IMPLAUSIBLE_M:
+    distances = np.linalg.norm(fitted.residual[:, :3], axis=1)
+    if root_mean_square(distances) > IMPLAUSIBLE_M:
         return []
-    std_error = np.sqrt(np.diag(fitted.covariance))[
-        fitted.parameter_indices("joint_compliance")
-    ]
-    found = get_joint_compliances(model, fitted.estimate)
+    indices = fitted.parameter_indices("joint_compliance")
+    std_error = np.sqrt(np.diag(fitted.covariance))[indices]
+    compliance = get_joint_compliances(model, fitted.estimate)
     nominal = model.nominal_compliance
-    most, word = (
-        (_MOST_OFF_NOMINAL, "nominal")
-        if model.compliance_known
-        else (_MOST_OFF_USUAL, "usual for such a robot")
-    )
-    # What has no standard error was not identified.
-    off = (std_error > 0) & ((found < nominal / most) | (found > most * nominal))
-    named = [
-        f"joint {j + 1} {1e6 * found[j]:.3g} ± {1e6 * std_error[j]:.2g} ({word} {1e6 * nominal[j]:.3g})"
-        for j in np.flatnonzero(off)
+    ratio = _MAX_USUAL_RATIO
+    reference = "usual for such a robot"
+    if model.compliance_known:
+        ratio = _MAX_NOMINAL_RATIO
+        reference = "nominal"
+    is_far = (compliance < nominal / ratio) | (compliance > ratio * nominal)
+    # A compliance without a standard error was not identified.
+    joints = [
+        f"joint {joint + 1} {1e6 * compliance[joint]:.3g} ± {1e6 * std_error[joint]:.2g} "
+        f"({reference} {1e6 * nominal[joint]:.3g})"
+        for joint in np.flatnonzero((std_error > 0) & is_far)
     ]
-    remedy = "check the sign and the unit of the loads, and whether something else yields too"
-    return (
-        [
-            f"joint compliances beyond what robots have, in µrad/(N·m): {', '.join(named)}; {remedy}"
-        ]
-        if named
-        else []
-    )
+    if not joints:
+        return []
+    return [
+        f"joint compliances beyond what robots have, in µrad/(N·m): {', '.join(joints)}; "
+        "check the sign and the unit of the loads, and whether something else yields too"
+    ]
 
 
 def warn_of_computed_positions(campaign: Campaign) -> list[str]:
-    """Say where positions are those of the robot file's own kinematics, as a controller
-    works them out."""
-    off = root_mean_square(place_measurements(campaign).distance)
-    if off > _NO_ROBOT_M:
+    """Warn of positions that a controller computed by the kinematics of the robot file."""
+    rms_m = root_mean_square(place_measurements(campaign).distance)
+    if rms_m > _MIN_ROBOT_ERROR_M:
         return []
     return [
-        f"positions are those of the robot file's own kinematics to {1e6 * off:.2g} µm, nearer than any robot goes: a"
-        " controller worked them out of the joint angles; they are no measurements, and show nothing of the robot"
+        f"positions are those of the robot file's own kinematics to {1e6 * rms_m:.2g} µm,"
+        " nearer than any robot goes: a controller worked them out of the joint angles;"
+        " they are no measurements, and show nothing of the robot"
     ]

@@ -1,5 +1,5 @@
-"""What a fault of the data is: a name, what the data resemble in plain words, and how
-much better they fit without it."""
+"""A fault of the data: its name, a plain description, and how much better the data fit
+without it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ DATA_FAMILY = "data"
 
 @dataclass(frozen=True)
 class Value:
-    """One number that describes a fault; `unit`: "–" where it has none."""
+    """A number that describes a fault; its unit is "–" if it has none."""
 
     name: str
     value: float
@@ -20,13 +20,21 @@ class Value:
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault that the measurements show, and that must be mended before anything is
-    traced.
+    """A fault that the measurements show, and that must be corrected before a diagnosis.
 
-    `joints`: joints concerned, counted from 1; empty where there are none. `detail`:
-    one sentence in plain words. `evidence`: RMS residual as written and with the
-    correction, m. Where only orientations show the fault: of a point 1 m away.
-    `alternatives`: what would explain the measurements as well, in plain words.
+    Attributes
+    ----------
+    name : str
+    joints : tuple of int
+        Joints concerned, counted from 1; empty if there are none.
+    detail : str
+        One plain sentence.
+    parameters : tuple of Value
+    evidence : (float, float)
+        RMS residual as written and with the correction, m. If only orientations show the
+        fault: of a point 1 m away.
+    alternatives : tuple of str
+        Plain sentences on what explains the measurements as well.
     """
 
     name: str

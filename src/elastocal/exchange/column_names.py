@@ -414,9 +414,9 @@ def _duplicate_error(text: TextTable, name: str, first: str, second: str) -> Inp
     quaternion = ""
     if name in ("q1", "q2", "q3", "q4"):
         quaternion = "; of a quaternion --column qw=NAME …"
-    found = f"both {first!r} and {second!r} for {name}"
+    problem = f"both {first!r} and {second!r} for {name}"
     allowed = f"--column {name}=NAME, or --ignore NAME{quaternion}"
-    return InputError(text.path, "header", found, allowed)
+    return InputError(text.path, "header", problem, allowed)
 
 
 def find_units(
@@ -459,10 +459,10 @@ def find_units(
             given.get(name) or stated.get(name) or _USUAL.get(kinds[0]) or unit_of_all
         )
         if unit is None:
-            found = f"no unit of {columns[name]!r}"
+            problem = f"no unit of {columns[name]!r}"
             option = "--lengths mm" if is_length else "--angles deg"
             raise InputError(
-                text.path, "header", found, f"{option} or such, or --unit {name}=UNIT"
+                text.path, "header", problem, f"{option} or such, or --unit {name}=UNIT"
             )
         if _scale(unit, kinds) is None:
             key = f"unit of {columns[name]!r}"

@@ -303,7 +303,7 @@ def find_axes(
     shifts = sum(prismatic)
     turns = len(prismatic) - shifts
     if turns != len(controller.axes) or shifts > len(controller.external):
-        found = f"{_count_revolute(turns)} and {shifts} that shift"
+        problem = f"{_count_revolute(turns)} and {shifts} that shift"
         if controller.external:
             allowed = (
                 f"--axes with what {controller.words} calls each of {joints}:"
@@ -312,7 +312,7 @@ def find_axes(
         else:
             count = _count_revolute(len(controller.axes))
             allowed = f"{count}, which is all that {controller.words} has"
-        raise InputError("--format", controller.name, found, allowed)
+        raise InputError("--format", controller.name, problem, allowed)
     robot_axes = iter(controller.axes)
     external_axes = iter(controller.external)
     return tuple(

@@ -54,7 +54,7 @@ from elastocal.exchange.robot_text import (
     check_imported,
     format_displacement,
     format_point_name,
-    format_words,
+    format_tokens,
     make_elementary_transform,
     make_origin_transform,
 )
@@ -179,27 +179,27 @@ def robot_from_dh(
                     "a name for every joint, each once",
                 )
         document["joint_names"] = names
-    words = _format_rows(table.rows, modified=modified)
-    short_words = _format_short_chain(table.rows, modified=modified)
-    length = _sum_lengths(words)
-    short_length = _sum_lengths(short_words)
+    tokens = _format_rows(table.rows, modified=modified)
+    short_tokens = _format_short_chain(table.rows, modified=modified)
+    length = _sum_lengths(tokens)
+    short_length = _sum_lengths(short_tokens)
     notes = [*table.notes, *_LACKS]
     if short_length < _MUCH_SHORTER * length:
-        words = short_words
+        tokens = short_tokens
         notes.append(
             f"lengths of {length:.4g} m that cancel along nearly parallel axes became"
             f" {short_length:.4g} m in the chain, whose joints are at other places of"
             " the same axes: the pose at the end is the same"
         )
-    document["chain"] = " ".join([*words, "[flange]"])
+    document["chain"] = " ".join([*tokens, "[flange]"])
     notation = "modified" if modified else "standard"
     description = f"{notation} Denavit-Hartenberg parameters"
     return check_imported(document, path, description, notes)
 
 
-def _sum_lengths(words: list[str]) -> float:
+def _sum_lengths(tokens: list[str]) -> float:
     """Sum the lengths of the shifts in a chain, m."""
-    shifts = (_SHIFT.fullmatch(word) for word in words)
+    shifts = (_SHIFT.fullmatch(token) for token in tokens)
     return sum(abs(float(shift[1])) for shift in shifts if shift)
 
 
@@ -289,12 +289,12 @@ def _check_unit(
     unit = unit or (options.angles if kind == ANGLE else options.lengths)
     if unit in UNITS[kind]:
         return unit
-    found = f"{header!r} in {unit}" if unit else f"no unit of {header!r}"
+    problem = f"{header!r} in {unit}" if unit else f"no unit of {header!r}"
     option = "--angles deg" if kind == ANGLE else "--lengths mm"
     raise InputError(
         text.path,
         "header",
-        found,
+        problem,
         f"{option} or such, or {', '.join(UNITS[kind])} behind the name",
     )
 
@@ -350,12 +350,12 @@ def _split_rows(rows: np.ndarray, *, modified: bool) -> Iterator[_DhRow]:
 
 def _format_rows(rows: np.ndarray, *, modified: bool) -> list[str]:
     """Format a table in the chain notation, row by row."""
-    words: list[str] = []
+    tokens: list[str] = []
     for joint, row in enumerate(_split_rows(rows, modified=modified), 1):
-        words += format_words(row.before)
-        words.append(f"Rz(q{joint})")
-        words += format_words(row.behind)
-    return words
+        tokens += format_tokens(row.before)
+        tokens.append(f"Rz(q{joint})")
+        tokens += format_tokens(row.behind)
+    return tokens
 
 
 def _format_short_chain(rows: np.ndarray, *, modified: bool) -> list[str]:
@@ -366,16 +366,16 @@ def _format_short_chain(rows: np.ndarray, *, modified: bool) -> list[str]:
     for row in _split_rows(rows, modified=modified):
         fixed[-1] = fixed[-1] @ _multiply(row.before)
         fixed.append(_multiply(row.behind))
-    words: list[str] = []
+    tokens: list[str] = []
     slide = 0.0
     for joint, transform in enumerate(fixed[:-1], 1):
         transform = make_elementary_transform("T", 2, -slide) @ transform
         # Take the point of the next axis that is closest to the current origin.
         slide = -float(transform[:3, 2] @ transform[:3, 3])
         transform = transform @ make_elementary_transform("T", 2, slide)
-        words += [*format_displacement(transform), f"Rz(q{joint})"]
+        tokens += [*format_displacement(transform), f"Rz(q{joint})"]
     last = make_elementary_transform("T", 2, -slide) @ fixed[-1]
-    return [*words, *format_displacement(last)]
+    return [*tokens, *format_displacement(last)]
 
 
 def _multiply(transforms: Iterable[tuple[str, float]]) -> np.ndarray:
@@ -393,20 +393,20 @@ def _robot_from_kinematics(path: str | Path, name: str) -> ImportedRobot:
     """Import the robot of a kinematics file, its links in the order of the arm."""
     source = Path(path).as_posix()
     links, has_digest = _read_links(path)
-    words: list[str] = []
+    tokens: list[str] = []
     joint_names = []
     understood = []
     for joint, (link, origin) in enumerate(links.items(), 1):
         values = _read_origin(origin, source, f"{_KINEMATICS}.{link}")
-        words += format_displacement(make_origin_transform(values[:3], values[3:]))
-        words.append(f"Rz(q{joint})")
+        tokens += format_displacement(make_origin_transform(values[:3], values[3:]))
+        tokens.append(f"Rz(q{joint})")
         joint_name = _JOINTS.get(link, link)
         joint_names.append(joint_name)
         understood.append(f"q{joint} is {joint_name} of {link!r}")
     document = {
         "name": name,
         "joint_names": joint_names,
-        "chain": " ".join([*words, f"[{format_point_name([*links][-1])}]"]),
+        "chain": " ".join([*tokens, f"[{format_point_name([*links][-1])}]"]),
     }
     notes = [f"read: {', '.join(understood)}"]
     if has_digest:

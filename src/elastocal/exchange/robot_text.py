@@ -1,6 +1,6 @@
 """The robot file of a robot that was imported from a file of another format.
 
-Fixed transforms become words of the chain notation. A rigid displacement becomes ``Tx Ty
+Fixed transforms become tokens of the chain notation. A rigid displacement becomes ``Tx Ty
 Tz Rz Ry Rx``, with its rotation as yaw, pitch and roll; elementary transforms of zero
 size are omitted.
 """
@@ -55,7 +55,7 @@ class ImportedRobot:
 
 
 @dataclass(frozen=True)
-class AxisWords:
+class AxisTokens:
     """Chain notation of a joint that moves about or along an axis.
 
     The chain has joints about x, y and z only. A joint with an oblique axis moves about z,
@@ -63,10 +63,10 @@ class AxisWords:
 
     Attributes
     ----------
-    before : words of the rotation that turns z into the axis; empty for x, y and z.
+    before : tokens of the rotation that turns z into the axis; empty for x, y and z.
     letter : axis of the joint in the rotated frame.
     sign : "-" if the joint moves about the negative axis, otherwise "".
-    after : words of the rotation back.
+    after : tokens of the rotation back.
     rotation : fixed rotation before the joint, (3, 3).
     """
 
@@ -207,8 +207,8 @@ def refuse_existing(path: str | Path, *, force: bool) -> None:
 
 
 def format_displacement(transform: np.ndarray) -> list[str]:
-    """Format a homogeneous transform (4, 4) in words of the chain notation."""
-    return format_words(
+    """Format a homogeneous transform (4, 4) in tokens of the chain notation."""
+    return format_tokens(
         [
             *zip(("Tx", "Ty", "Tz"), transform[:3, 3], strict=True),
             *zip(
@@ -220,13 +220,13 @@ def format_displacement(transform: np.ndarray) -> list[str]:
     )
 
 
-def format_words(transforms: Iterable[tuple[str, float]]) -> list[str]:
+def format_tokens(transforms: Iterable[tuple[str, float]]) -> list[str]:
     """Format elementary transforms, such as ``Tx(0.5)`` and ``Rx(90deg)``.
 
     `transforms` are names with amounts, in m for ``T`` and rad for ``R``. Transforms
     whose amount rounds to zero are omitted.
     """
-    words = []
+    tokens = []
     for name, amount in transforms:
         unit = ""
         if name.startswith("R"):
@@ -235,25 +235,25 @@ def format_words(transforms: Iterable[tuple[str, float]]) -> list[str]:
         amount = round(amount, _DECIMALS)
         if amount:
             number = np.format_float_positional(amount, trim="-")
-            words.append(f"{name}({number}{unit})")
-    return words
+            tokens.append(f"{name}({number}{unit})")
+    return tokens
 
 
-def express_axis(axis: np.ndarray) -> AxisWords:
+def express_axis(axis: np.ndarray) -> AxisTokens:
     """Express the axis of a joint, (3,) and not zero, in the chain notation."""
     unit = np.asarray(axis, float) / np.linalg.norm(axis)
     largest = int(np.argmax(np.abs(unit)))
     if np.abs(np.delete(unit, largest)).max() < 10.0**-_DECIMALS:
         sign = "-" if unit[largest] < 0 else ""
-        return AxisWords([], "xyz"[largest], sign, [], np.eye(3))
+        return AxisTokens([], "xyz"[largest], sign, [], np.eye(3))
     yaw = math.atan2(unit[1], unit[0])
     pitch = math.atan2(math.hypot(unit[0], unit[1]), unit[2])
-    # The rotation has the rounded angles of its words.
+    # The rotation has the rounded angles of its tokens.
     rounded = [round(math.degrees(angle), _DECIMALS) for angle in (yaw, pitch)]
     rotation = Rotation.from_euler("ZY", np.radians(rounded)).as_matrix()
-    before = format_words([("Rz", yaw), ("Ry", pitch)])
-    after = format_words([("Ry", -pitch), ("Rz", -yaw)])
-    return AxisWords(before, "z", "", after, rotation)
+    before = format_tokens([("Rz", yaw), ("Ry", pitch)])
+    after = format_tokens([("Ry", -pitch), ("Rz", -yaw)])
+    return AxisTokens(before, "z", "", after, rotation)
 
 
 def compute_yaw_pitch_roll(rotation: np.ndarray) -> tuple[float, float, float]:

@@ -135,9 +135,9 @@ def _read_all_or_none(
     if not present:
         return None
     if missing:
-        found = f"{', '.join(present)} without {', '.join(missing)}"
+        problem = f"{', '.join(present)} without {', '.join(missing)}"
         header = f"line {text.dialect.header}"
-        raise InputError(text.path, header, found, "all of them or none")
+        raise InputError(text.path, header, problem, "all of them or none")
     return cells.matrix(names)
 
 

@@ -480,23 +480,23 @@ def find_chain(
             ", ".join(map(repr, marks)),
             "links whose names differ by more than blanks and brackets",
         )
-    words = [marks.get(base, "")]
+    tokens = [marks.get(base, "")]
     moving: list[Joint] = []
     frame = np.eye(4)
     links = {base: (0, frame)}
     for joint in path:
-        words += format_displacement(joint.origin)
+        tokens += format_displacement(joint.origin)
         frame = frame @ joint.origin
         if joint.kind in _MOVING:
             moving.append(joint)
             axis = express_axis(joint.axis)
             coordinate = f"{axis.sign}q{len(moving)}"
             motion = f"{_MOVING[joint.kind]}{axis.letter}({coordinate})"
-            words += [*axis.before, motion, *axis.after]
+            tokens += [*axis.before, motion, *axis.after]
             frame = make_transform(axis.rotation.T)
-        words.append(marks.get(joint.child, ""))
+        tokens.append(marks.get(joint.child, ""))
         links[joint.child] = (len(moving), frame)
-    return UrdfChain(" ".join(filter(None, words)), tuple(moving), links)
+    return UrdfChain(" ".join(filter(None, tokens)), tuple(moving), links)
 
 
 def _find_path(urdf: Urdf, base: str, tip: str, source: str) -> list[Joint]:
@@ -513,10 +513,10 @@ def _find_path(urdf: Urdf, base: str, tip: str, source: str) -> list[Joint]:
     key = f"base {base!r}, tip {tip!r}"
     path = urdf.path_to(tip, base)
     if base != (path[0].parent if path else tip):
-        found = "two branches of the tree"
+        problem = "two branches of the tree"
         if any(joint.parent == tip for joint in urdf.joints_above(base)):
-            found = "a base that the tip carries (give them the other way round)"
-        raise InputError(source, key, found, "a tip that the base carries")
+            problem = "a base that the tip carries (give them the other way round)"
+        raise InputError(source, key, problem, "a tip that the base carries")
     if not any(joint.kind in _MOVING for joint in path):
         raise InputError(
             source, key, "no joint that moves between them", "links with joints between"
@@ -531,13 +531,13 @@ def _check_joint(joint: Joint, source: str) -> None:
     key = f"joint {joint.name!r}"
     kinds = (*_MOVING, "fixed")
     if joint.mimics or joint.kind not in kinds:
-        found = f"type {joint.kind}"
+        problem = f"type {joint.kind}"
         if joint.mimics:
-            found = "a joint that mimics another one"
+            problem = "a joint that mimics another one"
         raise InputError(
             source,
             key,
-            found,
+            problem,
             (
                 f"{' | '.join(kinds)}; parallel links are written in the robot file, see"
                 " docs/campaign.md"

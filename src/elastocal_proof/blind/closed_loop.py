@@ -56,6 +56,7 @@ from elastocal_proof.blind.rehearsal import (
     misplace_base,
     move_robot,
 )
+from elastocal_proof.blind.scores import compute_rate
 from elastocal_proof.plant.campaigns import (
     Blunder,
     Design,
@@ -148,8 +149,6 @@ class DiagnosedRobot:
     ----------
     plant : SimulatedRobot
         The simulated robot.
-    declared : Robot
-        The robot as the analyst knows it.
     training, held_out : Case
         Fitted and held-out measurements.
     diagnosis : Diagnosis
@@ -159,7 +158,6 @@ class DiagnosedRobot:
     """
 
     plant: SimulatedRobot
-    declared: Robot
     training: Case
     held_out: Case
     diagnosis: Diagnosis
@@ -248,10 +246,9 @@ def measure_robot(
             partial(_lose_beam, experiment) if slips else None,
         )
         training, held_out = read_cases(folder, robot_file.parent)
-    robot = training.campaign.robot
     diagnosis = diagnose(training, Settings(), seed)
-    wanted = draw_wanted_poses(robot, plant, seed)
-    return DiagnosedRobot(plant, robot, training, held_out, diagnosis, wanted)
+    wanted = draw_wanted_poses(training.campaign.robot, plant, seed)
+    return DiagnosedRobot(plant, training, held_out, diagnosis, wanted)
 
 
 def _lose_beam(experiment: Experiment, table: Table) -> tuple[Table, list[Blunder]]:
@@ -318,9 +315,10 @@ def run_closed_loop(
     diagnosis = robot.diagnosis
     wanted = robot.wanted
     count = len(wanted.part)
-    rigid = replace(robot.declared, masses=())
-    geometry = calibrate_by_fit(_fit_geometry(robot.training, diagnosis), rigid)
-    declared = calibrate_by_fit(diagnosis.declared, robot.declared)
+    declared_robot = robot.training.campaign.robot
+    weightless = replace(declared_robot, masses=())
+    geometry = calibrate_by_fit(_fit_geometry(robot.training, diagnosis), weightless)
+    declared = calibrate_by_fit(diagnosis.declared, declared_robot)
     commands = {
         UNCORRECTED: _Commands(wanted.start, np.zeros(count), np.ones(count, bool)),
         GEOMETRY: _correct(geometry, wanted),
@@ -390,7 +388,7 @@ def _correct(model: CalibratedRobot, wanted: WantedPoses) -> _Commands:
 def _correct_by_plant(robot: DiagnosedRobot, seed: int) -> _Commands:
     """Correct the commands by Newton's method on the simulated robot without its random
     errors; it states no error."""
-    declared = robot.declared
+    declared = robot.training.campaign.robot
     wanted = robot.wanted
     deterministic = replace(robot.plant, repeatability_rad=())
     angles = wanted.start.copy()
@@ -695,34 +693,22 @@ def compute_coverage(rows: pd.DataFrame) -> pd.DataFrame:
         squares = rows.loc[selected, ["true_rms_m", "rms_m"]] ** 2
         ratio = np.sqrt(squares["true_rms_m"].mean() / squares["rms_m"].mean())
         for question, (concerned, hits) in questions.items():
+            rate = compute_rate(hits[selected & concerned])
             counts.append(
                 {
                     "frame": frame,
                     "part": part,
                     "verdict": verdict,
                     "question": question,
-                    **_count_hits(hits[selected & concerned]),
+                    "cases": rate["cases"],
+                    "hits": rate["hits"],
+                    "share": rate["hits"] / max(rate["cases"], 1),
+                    "low": rate["low"],
+                    "high": rate["high"],
                     "true_over_predicted": float(ratio),
                 }
             )
     return pd.DataFrame(counts)
-
-
-def _count_hits(hits: pd.Series) -> dict[str, float]:
-    """Count hits among cases, with the Clopper-Pearson interval of their share."""
-    cases = len(hits)
-    count = int(hits.sum())
-    low = 0.0
-    high = 1.0
-    if cases:
-        low, high = proportion_confint(count, cases, method="beta")
-    return {
-        "cases": cases,
-        "hits": count,
-        "share": count / max(cases, 1),
-        "low": low,
-        "high": high,
-    }
 
 
 def summarize_closed_loop(job: Any) -> None:

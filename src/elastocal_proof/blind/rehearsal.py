@@ -192,8 +192,8 @@ def fill_sheet(
     source = path.as_posix()
     sheet = _read_table(path)
     targets = list(document["targets"])
-    joint_names = [f"q{joint}" for joint in range(1, robot.arm.joints + 1)]
-    require_numbers(sheet, [*_STATE, *joint_names, *WRENCH_NAMES], source)
+    angle_names = _name_angles(robot.arm.joints)
+    require_numbers(sheet, [*_STATE, *angle_names, *WRENCH_NAMES], source)
     if "target" not in sheet:
         raise InputError(source, "columns", "no 'target'", "the target of each row")
     unknown = sheet[~sheet["target"].isin(targets)]
@@ -271,8 +271,8 @@ def write_milling_path(
     )
     force = get_typical_force_N(robot.arm) / 2
     wrench = np.tile([0.0, 0.0, force, 0.0, 0.0, 0.0], (_PATH_POSES, 1))
-    joint_names = [f"q{joint}" for joint in range(1, angles.shape[1] + 1)]
-    names = ["x", "y", "z", "rx", "ry", "rz", *WRENCH_NAMES, *joint_names]
+    angle_names = _name_angles(angles.shape[1])
+    names = ["x", "y", "z", "rx", "ry", "rz", *WRENCH_NAMES, *angle_names]
     columns = [position, Rotation.from_matrix(rotation).as_rotvec(), wrench, angles]
     _write_table(path, pd.DataFrame(np.column_stack(columns), columns=names))
     return _PATH_POSES
@@ -312,8 +312,8 @@ def measure_errors(
     if wrench is None:
         wrench = np.zeros((len(wanted), 6))
     errors = {}
-    for name, suffix in (("uncorrected", "_uncorrected"), ("corrected", "")):
-        columns = [f"q{joint}{suffix}" for joint in range(1, robot.arm.joints + 1)]
+    for model, suffix in (("uncorrected", "_uncorrected"), ("corrected", "")):
+        columns = [name + suffix for name in _name_angles(robot.arm.joints)]
         require_numbers(table, columns, source)
         angles = table[columns].to_numpy(float)
         position, rotation = move_robot(robot, angles, wrench, seed, source)
@@ -321,7 +321,7 @@ def measure_errors(
         draws = open_simulation_stream(seed, "noise along a path")
         measured, _ = robot.tracker.read(position[:, None], rotation[:, None], draws)
         noise = measured[:, 0] - position
-        errors[name] = np.linalg.norm(position + noise - wanted.position, axis=1)
+        errors[model] = np.linalg.norm(position + noise - wanted.position, axis=1)
         # The variance of the repeatability is half the mean square of the difference of
         # two visits.
         repeatability = (position - second_position) / np.sqrt(2.0)
@@ -358,7 +358,7 @@ def move_robot(
         Positions, m, and rotations in the declared base frame.
     """
     count, joints = angles.shape
-    names = [*(f"q{joint}" for joint in range(1, joints + 1)), *WRENCH_NAMES]
+    names = [*_name_angles(joints), *WRENCH_NAMES]
     states = pd.DataFrame(np.hstack([angles, wrench]), columns=names)
     states = states.assign(pose=np.arange(count), load=0, repeat=0)
     schedule = _build_schedule(robot.arm, states, seed, source)
@@ -421,6 +421,11 @@ def draw_milling_path(
     )
 
 
+def _name_angles(joints: int) -> list[str]:
+    """Name the columns of joint angles."""
+    return [f"q{joint}" for joint in range(1, joints + 1)]
+
+
 def require_numbers(table: pd.DataFrame, names: Sequence[str], source: str) -> None:
     """Refuse a table that lacks a column or has an entry that is no number, by an
     `InputError` that names `source` and the line."""
@@ -439,16 +444,15 @@ def _build_schedule(arm: Arm, states: pd.DataFrame, seed: int, source: str) -> S
     count = len(states)
     force, moment = np.split(states[list(WRENCH_NAMES)].to_numpy(float), 2, axis=1)
     lever = _find_levers(force, moment, source)
-    joints = range(1, arm.joints + 1)
     # Directions of approach that the table does not state are drawn.
     draws = open_simulation_stream(seed, "approaches")
     sense = draws.choice([-1, 1], (count, arm.joints))
-    approach_names = [f"approach{joint}" for joint in joints]
+    approach_names = [f"approach{joint}" for joint in range(1, arm.joints + 1)]
     if set(approach_names) <= set(states):
         stated = states[approach_names].fillna(0).to_numpy(int)
         sense = np.where(stated == 0, sense, stated)
     return Schedule(
-        angle=states[[f"q{joint}" for joint in joints]].to_numpy(float),
+        angle=states[_name_angles(arm.joints)].to_numpy(float),
         force=force,
         lever=lever,
         **{name: states[name].to_numpy(int) for name in _STATE},

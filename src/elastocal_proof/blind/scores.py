@@ -44,6 +44,9 @@ EXACT_ALIASES: dict[tuple[str, tuple[int, ...]], str] = {
     ("transmission_harmonic", (2,)): "compensator_torque",
     ("link_weight", (2,)): "compensator_torque",
 }
+# Results of an oracle and of a best analyst that a case has none of.
+_NO_ORACLE: Document = {"detected": np.nan, "heldout": {"rms_m": np.nan}}
+_NO_LIMIT: Document = {"detected": np.nan, "right": np.nan}
 # Errors got worse if their increase is beyond this many standard errors.
 _STD_ERRORS = 2.0
 # Probability of a credible set.
@@ -104,6 +107,8 @@ def build_case_row(
         residual is reported; ``exact_alias``, the effect lies within the span of
         another effect that the robot can have, by the ground truth alone.
     """
+    oracle = oracle or _NO_ORACLE
+    limit = limit or _NO_LIMIT
     case = truth["case"]
     defects = truth["defects"]
     kind, effects = _remove_setup_effects(truth, verdict)
@@ -139,10 +144,10 @@ def build_case_row(
         ),
         **_describe_size(truth),
         **_describe_errors(verdict),
-        "oracle_detected": np.nan if oracle is None else float(oracle["detected"]),
-        "oracle_rms_m": np.nan if oracle is None else oracle["heldout"]["rms_m"],
-        "limit_detected": np.nan if limit is None else float(limit["detected"]),
-        "limit_right": np.nan if limit is None else float(limit["right"]),
+        "oracle_detected": float(oracle["detected"]),
+        "oracle_rms_m": oracle["heldout"]["rms_m"],
+        "limit_detected": float(limit["detected"]),
+        "limit_right": float(limit["right"]),
         **score_probabilities(truth, verdict),
     }
 

@@ -247,9 +247,6 @@ def compute_calibration_error(
     .. [2] Guo, C., Pleiss, G., Sun, Y. and Weinberger, K. Q., On calibration of modern
        neural networks, International Conference on Machine Learning, 2017.
     """
-    probability, correct = np.broadcast_arrays(
-        np.asarray(probability, float), np.asarray(correct, float)
-    )
     cases = probability.shape[-1]
     if cases == 0:
         return np.full(probability.shape[:-1], np.nan)
@@ -318,7 +315,7 @@ def tabulate_reliability(cases: pd.DataFrame) -> pd.DataFrame:
 
 def _find_bins(probability: np.ndarray) -> np.ndarray:
     """Find the bin of each probability."""
-    return np.clip((np.asarray(probability) * _BINS).astype(int), 0, _BINS - 1)
+    return np.clip((probability * _BINS).astype(int), 0, _BINS - 1)
 
 
 def tabulate_rates(cases: pd.DataFrame) -> pd.DataFrame:
