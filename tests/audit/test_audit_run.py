@@ -40,14 +40,12 @@ def write(folder, seed=1, robot="two"):
     forge(folder.folder, FILE)
 
 
-def test_a_file_as_it_was_written_holds(folder):
+def test_an_unaltered_file_holds(folder):
     write(folder)
-    found = audit_run(folder)
-    assert (
-        failed(found) == []
-        and len(found) == 5
-        and {each.file for each in found} == {FILE}
-    )
+    findings = audit_run(folder)
+    assert failed(findings) == []
+    assert len(findings) == 5
+    assert {finding.file for finding in findings} == {FILE}
 
 
 @pytest.mark.parametrize(
@@ -57,12 +55,12 @@ def test_a_file_as_it_was_written_holds(folder):
         ({"robot": "other"}, "made for where it lies"),
     ],
 )
-def test_a_file_of_another_run_or_robot_is_found(folder, change, checked):
+def test_a_file_of_another_run_or_robot_does_not_hold(folder, change, checked):
     write(folder, **change)
     assert failed(check_provenance(folder, FILE)) == [checked]
 
 
-def test_an_altered_a_missing_and_an_unreadable_file_are_found_and_an_empty_folder_is_no_finished_run(
+def test_altered_missing_and_unreadable_files_and_empty_folders_are_findings(
     folder,
 ):
     assert [finding.holds for finding in audit_run(folder)] == [False]
@@ -73,14 +71,12 @@ def test_an_altered_a_missing_and_an_unreadable_file_are_found_and_an_empty_fold
     assert not check_checksum(folder, FILE, digest).holds
     (folder.folder / FILE).unlink()
     assert check_checksum(folder, FILE, digest).note == "it is missing"
-    # One that cannot be read is a finding and no traceback.
+    # A file that cannot be read gives a finding and no traceback.
     (folder.folder / FILE).write_bytes(b"no table")
     forge(folder.folder, FILE)
-    found = audit_run(folder)
-    assert [finding.holds for finding in found] == [
-        True,
-        False,
-    ] and "ArrowInvalid" in found[1].note
+    findings = audit_run(folder)
+    assert [finding.holds for finding in findings] == [True, False]
+    assert "ArrowInvalid" in findings[1].note
 
 
 GOOD = Finding(
@@ -107,7 +103,7 @@ BYTES = Finding(
 )
 
 
-def test_the_page_says_first_whether_all_holds_and_what_was_not_worked_out_again():
+def test_the_page_states_whether_all_checks_hold_and_which_files_were_not_recomputed():
     again, apart = render_page(tabulate_findings([GOOD, BYTES]), {"seed": "1"}).split(
         "What was not worked out again"
     )
@@ -118,7 +114,7 @@ def test_the_page_says_first_whether_all_holds_and_what_was_not_worked_out_again
     )
     assert "reports/figures/*.pdf" in apart and "reports/figures/*.pdf" not in again
     assert all(check.__doc__ for _, check in CHECKS)
-    # What does not hold is shown, and nothing of it is run.
+    # Failed checks are shown, with their text escaped.
     text = render_page(tabulate_findings([GOOD, BAD]), {})
     assert (
         "1 of 2 checks do not hold." in text

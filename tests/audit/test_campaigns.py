@@ -1,5 +1,5 @@
-"""Simulated campaigns as they were drawn hold; a value altered, a pose that leaks and a
-broken seal are found."""
+"""Unaltered simulated campaigns hold; an altered value, a leaked pose and a broken seal
+do not."""
 
 import hashlib
 import json
@@ -69,7 +69,7 @@ def drawn(tmp_path):
     return FinishedRun(tmp_path, CONFIGURATION, {}, {}, 4)
 
 
-def found_in(run):
+def find_failures(run):
     run.table.cache_clear()
     return failed(
         [
@@ -81,7 +81,7 @@ def found_in(run):
 
 def test_a_simulated_campaign_is_drawn_again_and_no_measured_one(drawn):
     assert (
-        found_in(drawn) == []
+        find_failures(drawn) == []
         and len([*check_simulated_campaign(drawn, DRAWN, "cell")]) == 4
     )
 
@@ -98,17 +98,17 @@ def test_a_simulated_campaign_is_drawn_again_and_no_measured_one(drawn):
         (TRAINING, "z", lambda v: v + 1e-6, "positions as measured"),
     ],
 )
-def test_a_value_altered_is_found(drawn, file, column, change, checked):
+def test_an_altered_value_does_not_hold(drawn, file, column, change, checked):
     with altered(drawn.folder, file, (column, 4), change):
-        assert checked in found_in(drawn)
-    # One that was measured is not.
+        assert checked in find_failures(drawn)
+    # A measured campaign has no simulation to check.
     (drawn.folder / "config/campaigns/cell.yaml").write_text(
         "source: public\n", encoding="utf-8"
     )
     assert [*check_simulated_campaign(drawn, DRAWN, "cell")] == []
 
 
-def test_a_ground_truth_altered_after_its_seal_is_found(drawn):
+def test_a_ground_truth_altered_after_its_seal_does_not_hold(drawn):
     sealed = drawn.folder / "data/sealed/some_1/case.json"
     manifest = drawn.folder / "reports/blind/manifest.sha256"
     sealed.parent.mkdir(parents=True)

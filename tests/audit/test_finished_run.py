@@ -1,4 +1,4 @@
-"""Streams as they are described are streams as they are drawn; rows of a sample."""
+"""Random streams against those of the pipeline, samples of rows, and findings."""
 
 import numpy as np
 import pandas as pd
@@ -17,7 +17,7 @@ from elastocal_proof.audit.finished_run import (
     "name",
     [(1, "kuka", "identification/force", 0), (7, "fanuc", "noise/6DoF/again", 999)],
 )
-def test_numbers_are_those_of_the_pipeline(name):
+def test_the_stream_equals_that_of_the_pipeline(name):
     assert (open_philox_stream(*name).random(5) == open_stream(*name).random(5)).all()
 
 
@@ -36,23 +36,23 @@ def test_a_sample_is_drawn_by_the_name_of_the_file(run):
     [(1.0 + 0.9e-9, True), (1.0 + 1.1e-9, False), (np.nan, False), (np.inf, False)],
 )
 def test_a_difference_is_measured_by_the_largest_expected_value(found, holds):
-    told = compare("c", "b", [found, 0.5], [1.0, 0.5])
-    assert told.holds is holds and (told.note == "") is holds
-    # Equal values hold even where nothing is allowed.
+    finding = compare("c", "b", [found, 0.5], [1.0, 0.5])
+    assert finding.holds is holds and (finding.note == "") is holds
+    # Equal values hold even without any tolerance.
     assert compare(
         "c", "b", [found, np.nan, np.inf], [found, np.nan, np.inf], 0.0
     ).holds
 
 
-def test_a_note_says_why_a_check_does_not_hold_and_rows_are_numbered_by_all_combinations():
+def test_a_note_states_why_a_check_fails_and_rows_number_all_combinations():
     assert (
         compare("c", "b", [1.0, 2.5], [1.0, 2.0]).note
         == "value 1: found 2.5, expected 2"
     )
     assert "found 1 values, expected 2" in compare("c", "b", [1.0], [1.0, 2.0]).note
     assert (
-        require("c", "b", True, "why").note == ""
-        and require("c", "b", False, "why").note == "why"
+        require("c", "b", holds=True, note="why").note == ""
+        and require("c", "b", holds=False, note="why").note == "why"
     )
     frame = pd.DataFrame({"a": [0, 0, 1, 1], "b": [1, 2, 1, 2]})
     assert require_each_once(frame, a=range(2), b=range(1, 3)).holds

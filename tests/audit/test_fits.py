@@ -1,5 +1,5 @@
-"""Fits of diagnosed campaigns hold; an estimate, a standard error, a correlation or a
-residual altered does not."""
+"""Fits of diagnosed campaigns hold; an altered estimate, standard error, correlation or
+residual does not."""
 
 import numpy as np
 import pandas as pd
@@ -17,8 +17,8 @@ WRENCH = np.array([100.0, -200.0, 300.0, 40.0, 50.0, -60.0])
 
 
 @pytest.mark.parametrize("chain", [TURNED, TRACK])
-def test_an_arm_stands_by_mujoco_where_it_stands_by_pinocchio(chain):
-    """With springs in its links too."""
+def test_mujoco_and_pinocchio_agree_on_the_deflected_arm(chain):
+    """The arm has springs in its joints and links."""
     arm = Arm({"chain": chain, "links": {}})
     draws = np.random.default_rng(1)
     angles = draws.uniform(-1, 1, arm.joints)
@@ -26,16 +26,16 @@ def test_an_arm_stands_by_mujoco_where_it_stands_by_pinocchio(chain):
     springs = half @ half.T
     for point in arm.points:
         expected = arm.pose(arm.deflect(springs, angles, WRENCH, 3)[0], point)[0]
-        found = iterate_equilibrium(
+        positions = iterate_equilibrium(
             arm, build_mujoco_model(arm), springs, angles, WRENCH, point
         )
-        np.testing.assert_allclose(found[2], expected, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(positions[2], expected, rtol=0, atol=1e-12)
         assert np.abs(expected - arm.pose(arm.extend(angles), point)[0]).max() > 1e-6
-        assert np.abs(found[-1] - found[-2]).max() < 1e-12
+        assert np.abs(positions[-1] - positions[-2]).max() < 1e-12
 
 
-# Robot, effects and how it is measured; the second lacks what no model of the audit
-# has, the third repeats.
+# Robot, effects and design of the measurements. The second campaign has an effect that
+# no model of the audit has.
 HONEST = [
     ("kuka", ("joint_offset",), {"covariates": ()}),
     pytest.param(
@@ -59,16 +59,20 @@ HONEST = [
 
 @pytest.mark.parametrize(("robot", "effects", "design"), HONEST)
 def test_an_honest_campaign_raises_no_alarm(robot, effects, design, tmp_path):
-    found = audit_of(diagnosed_campaign(tmp_path, robot, effects, **design))
-    assert failed(found) == [] and len(found) >= 1
+    findings = audit_of(diagnosed_campaign(tmp_path, robot, effects, **design))
+    assert failed(findings) == []
+    assert len(findings) >= 1
 
 
 def test_a_campaign_of_springs_holds(diagnosed):
-    found = audit_of(diagnosed)
-    assert failed(found) == []
-    assert {finding.by for finding in found} >= {"MuJoCo", "statsmodels on pinocchio"}
+    findings = audit_of(diagnosed)
+    assert failed(findings) == []
+    assert {finding.by for finding in findings} >= {
+        "MuJoCo",
+        "statsmodels on pinocchio",
+    }
     assert {"residuals before", "residuals after"} <= {
-        finding.checked.partition(",")[0] for finding in found
+        finding.checked.partition(",")[0] for finding in findings
     }
 
 
@@ -91,15 +95,19 @@ def test_a_campaign_of_springs_holds(diagnosed):
         (RESIDUALS, ("after_dz", -1), lambda value: value + 1e-6, "residuals after"),
     ],
 )
-def test_a_figure_altered_is_found(diagnosed, file, at, change, expected):
+def test_an_altered_figure_does_not_hold(diagnosed, file, at, change, expected):
     with altered(diagnosed, file, at, change):
-        found = failed(audit_of(diagnosed, RESIDUALS if file == RESIDUALS else STEPS))
-    assert any(name.startswith(expected) for name in found)
+        failures = failed(
+            audit_of(diagnosed, RESIDUALS if file == RESIDUALS else STEPS)
+        )
+    assert any(name.startswith(expected) for name in failures)
 
 
-def test_an_estimate_off_by_a_hundredth_of_its_standard_error_is_found(diagnosed):
-    more = 0.01 * pd.read_parquet(diagnosed / STEPS)["std_error"].iloc[1]
-    with altered(diagnosed, STEPS, ("value", 1), lambda value: value + more):
+def test_an_estimate_wrong_by_a_hundredth_of_its_standard_error_does_not_hold(
+    diagnosed,
+):
+    error = 0.01 * pd.read_parquet(diagnosed / STEPS)["std_error"].iloc[1]
+    with altered(diagnosed, STEPS, ("value", 1), lambda value: value + error):
         assert (
             "estimates of step 1 (declared) stand still, in standard errors"
             in failed(audit_of(diagnosed, STEPS))
@@ -107,15 +115,18 @@ def test_an_estimate_off_by_a_hundredth_of_its_standard_error_is_found(diagnosed
 
 
 @pytest.mark.parametrize(
-    ("key", "other"),
+    ("key", "setting"),
     [
         ("frame", "tracker"),
         ("declared", ["joint_offset"]),
         ("targets", {"hand": {"point": "6DoF", "offset_m": "unknown"}}),
     ],
 )
-def test_what_is_not_written_down_here_is_left_out(diagnosed, key, other):
+def test_campaigns_beyond_the_models_of_the_audit_are_left_out(diagnosed, key, setting):
     with altered(
-        diagnosed, "results/loop/cell/campaign.json", ["campaign", key], lambda _: other
+        diagnosed,
+        "results/loop/cell/campaign.json",
+        ["campaign", key],
+        lambda _: setting,
     ):
         assert audit_of(diagnosed) == []

@@ -21,12 +21,6 @@ OFFSET = 1e-3
 DECLARED_NOISE_M = (6e-5, 1e-6)
 
 
-def select_rows(table, selected):
-    """Some rows of a table of columns; `selected` has a bool for each."""
-    rows = np.flatnonzero(selected).tolist()
-    return {name: [column[row] for row in rows] for name, column in table.items()}
-
-
 @pytest.fixture(scope="module")
 def diagnoses_by_noise(kuka, config_folder, tmp_path_factory):
     """Diagnoses of measurements without repeats that scatter by 60 µm, by the declared
@@ -34,10 +28,12 @@ def diagnoses_by_noise(kuka, config_folder, tmp_path_factory):
     diagnoses = {}
     for noise_m in DECLARED_NOISE_M:
         table = make_table(kuka, "made", plan=PLAN, offset_of_joint_3=OFFSET)
+        is_first = np.equal(table["repeat"], 0)
+        table = {name: np.asarray(column)[is_first] for name, column in table.items()}
         folder = make_folder(
             tmp_path_factory.mktemp("noise") / "made",
             kuka,
-            table=select_rows(table, np.equal(table["repeat"], 0)),
+            table=table,
             noise={"position_m": noise_m},
             declared=["link_geometry"],
         )

@@ -21,7 +21,7 @@ from elastocal.fitting.model import predict
 
 
 @pytest.mark.parametrize(
-    ("mechanism", "location", "words"),
+    ("mechanism", "location", "phrase"),
     [
         ("joint_offset", (2,), "joint 2"),
         ("link_elasticity", (2, 3), "links 2 and 3"),
@@ -30,16 +30,20 @@ from elastocal.fitting.model import predict
         ("payload", (), ""),
     ],
 )
-def test_a_location_is_given_by_joints_or_links_and_details(mechanism, location, words):
-    assert format_location(mechanism, location) == words
+def test_a_location_is_given_by_joints_or_links_and_details(
+    mechanism, location, phrase
+):
+    assert format_location(mechanism, location) == phrase
 
 
 def test_a_fault_of_the_data_has_evidence_and_no_probability():
     fault = state_fault(
         Fault("wrong_sign", (2,), "why", (Value("x", 0.5, "m"),), (np.inf, 1e-4))
     )
-    assert fault.family == "data" and fault.probability is None
-    assert fault.evidence == (None, 1e-4) and fault.parameters[0].value == 0.5
+    assert fault.family == "data"
+    assert fault.probability is None
+    assert fault.evidence == (None, 1e-4)
+    assert fault.parameters[0].value == 0.5
 
 
 @pytest.fixture(scope="module")
@@ -48,51 +52,46 @@ def campaign(kuka):
 
 
 @pytest.fixture(scope="module")
-def found(campaign):
-    """A fit of some effects that the robot does not have."""
-    effects = [
-        campaign.candidates[key]
-        for key in ("joint_tilt@2", "payload", "joint_offset@3", "base_compliance")
-    ]
-    model = campaign.declared.model.with_effects(effects)
-    start = campaign.declared.estimate.with_effects(effects)
-    count = len(campaign.declared.parameters) + sum(
-        len(effect.parameters) for effect in effects
+def fitted(campaign):
+    """A fit of four effects that the robot does not have, with tiny standard errors."""
+    keys = ("joint_tilt@2", "payload", "joint_offset@3", "base_compliance")
+    effects = [campaign.candidates[key] for key in keys]
+    declared = campaign.declared
+    widths = [len(effect.parameters) for effect in effects]
+    count = len(declared.parameters) + sum(widths)
+    return replace(
+        declared,
+        model=declared.model.with_effects(effects),
+        estimate=declared.estimate.with_effects(effects),
+        covariance=1e-24 * np.eye(count),
+        unidentifiable=np.zeros(count, bool),
     )
-    stated = {
-        "covariance": 1e-24 * np.eye(count),
-        "unidentifiable": np.zeros(count, bool),
-    }
-    fitted = replace(campaign.declared, model=model, estimate=start, **stated)
-    return fitted, [effect.key for effect in effects]
 
 
-def effect_of(fitted, key):
+def find_effect(fitted, key):
     return next(effect for effect in fitted.model.effects if effect.key == key)
 
 
-def with_value(fitted, key, value, error):
-    """The same fit with the first parameter of an effect at a value of a given standard
-    error."""
-    number = [effect.key for effect in fitted.model.effects].index(key)
-    values = [part.copy() for part in fitted.estimate.coefficients]
-    values[number][0] = value
-    place = [owner for owner, _ in fitted.parameters].index(key)
+def replace_first_parameter(fitted, key, value, std_error):
+    """The same fit with another estimate of the first parameter of an effect."""
+    effect_index = [effect.key for effect in fitted.model.effects].index(key)
+    coefficients = [values.copy() for values in fitted.estimate.coefficients]
+    coefficients[effect_index][0] = value
+    parameter_index = [owner for owner, _ in fitted.parameters].index(key)
     covariance = fitted.covariance.copy()
-    covariance[place, place] = error**2
+    covariance[parameter_index, parameter_index] = std_error**2
     return replace(
         fitted,
-        estimate=replace(fitted.estimate, coefficients=tuple(values)),
+        estimate=replace(fitted.estimate, coefficients=tuple(coefficients)),
         covariance=covariance,
     )
 
 
-def test_parameters_have_their_values_errors_and_priors(found):
-    fitted, _ = found
-    fitted = with_value(fitted, "joint_offset@3", 3e-4, 2e-5)
-    effect = effect_of(fitted, "joint_offset@3")
-    (entry,) = state_parameters(effect, fitted, ModelAverage({}, {}))
-    assert asdict(entry) == {
+def test_parameters_have_their_values_errors_and_priors(fitted):
+    fitted = replace_first_parameter(fitted, "joint_offset@3", 3e-4, 2e-5)
+    effect = find_effect(fitted, "joint_offset@3")
+    (parameter,) = state_parameters(effect, fitted, ModelAverage({}, {}))
+    assert asdict(parameter) == {
         "name": "joint_offset@3 offset",
         "value": pytest.approx(3e-4),
         "std_error": pytest.approx(2e-5),
@@ -102,123 +101,105 @@ def test_parameters_have_their_values_errors_and_priors(found):
         "identifiable": True,
         "shape": False,
     }
-    # What other models say moves the value and widens its error, and it may be the
-    # prior alone that says it.
-    name = ("joint_offset@3", "offset")
-    (entry,) = state_parameters(
-        effect, fitted, ModelAverage({name: 1e-5}, {name: 4e-5}, frozenset([name]))
-    )
-    assert (
-        entry.value == pytest.approx(3.1e-4)
-        and entry.std_error == 4e-5
-        and not entry.identifiable
-    )
+    # Other models shift the value and widen its error. If the prior dominates, the
+    # parameter is not identifiable.
+    key = ("joint_offset@3", "offset")
+    average = ModelAverage({key: 1e-5}, {key: 4e-5}, frozenset([key]))
+    (parameter,) = state_parameters(effect, fitted, average)
+    assert parameter.value == pytest.approx(3.1e-4)
+    assert parameter.std_error == 4e-5
+    assert not parameter.identifiable
 
 
-def declared_springs(fitted, compliance):
+def use_nominal_compliances(fitted, compliance):
     """The same fit of a campaign that takes the compliances from the robot file."""
+    model = fitted.model
+    estimate = fitted.estimate
     kept = [
-        n
-        for n, effect in enumerate(fitted.model.effects)
+        number
+        for number, effect in enumerate(model.effects)
         if effect.effect != "joint_compliance"
     ]
-    free = np.array([owner != "joint_compliance" for owner, _ in fitted.parameters])
+    is_kept = np.array([owner != "joint_compliance" for owner, _ in fitted.parameters])
     return replace(
         fitted,
         model=replace(
-            fitted.model,
-            effects=tuple(fitted.model.effects[n] for n in kept),
+            model,
+            effects=tuple(model.effects[number] for number in kept),
             nominal_compliance=compliance,
         ),
         estimate=replace(
-            fitted.estimate,
-            coefficients=tuple(fitted.estimate.coefficients[n] for n in kept),
-            shapes=tuple(fitted.estimate.shapes[n] for n in kept),
+            estimate,
+            coefficients=tuple(estimate.coefficients[number] for number in kept),
+            shapes=tuple(estimate.shapes[number] for number in kept),
         ),
-        covariance=fitted.covariance[np.ix_(free, free)],
-        unidentifiable=fitted.unidentifiable[free],
+        covariance=fitted.covariance[np.ix_(is_kept, is_kept)],
+        unidentifiable=fitted.unidentifiable[is_kept],
     )
 
 
-def test_no_mass_is_told_where_the_compliances_are_not_identified(found):
-    fitted, _ = found
-    heavy = with_value(fitted, "payload", 24.4, 0.9)
-    payload = effect_of(heavy, "payload")
+def test_masses_are_stated_times_a_compliance_if_compliances_are_not_identified(fitted):
+    heavy = replace_first_parameter(fitted, "payload", 24.4, 0.9)
+    payload = find_effect(heavy, "payload")
     assert state_parameters(payload, heavy, ModelAverage({}, {}))[0].unit == "kg"
-    taken = declared_springs(heavy, 1e-6 * np.array([20.0, 8.0, 3.0, 2.0, 2.0, 2.0]))
-    # Weight cannot turn the first joint, however soft it is.
-    first, *others = state_parameters(payload, taken, ModelAverage({}, {}))
-    assert first.name == "payload compliance_of_joint_2_times_mass"
-    assert (first.value, first.std_error) == pytest.approx((8e-6 * 24.4, 8e-6 * 0.9))
-    assert [entry.unit for entry in (first, *others)] == [
-        "rad kg/(N m)",
-        *["rad kg m/(N m)"] * 3,
-    ]
+    compliance = 1e-6 * np.array([20.0, 8.0, 3.0, 2.0, 2.0, 2.0])
+    nominal = use_nominal_compliances(heavy, compliance)
+    parameters = state_parameters(payload, nominal, ModelAverage({}, {}))
+    # Weight cannot turn the first joint, however compliant it is.
+    mass = parameters[0]
+    assert mass.name == "payload compliance_of_joint_2_times_mass"
+    assert mass.value == pytest.approx(8e-6 * 24.4)
+    assert mass.std_error == pytest.approx(8e-6 * 0.9)
+    units = [parameter.unit for parameter in parameters]
+    assert units == ["rad kg/(N m)", *["rad kg m/(N m)"] * 3]
 
 
-def test_sag_is_how_far_the_weight_moves_a_target_at_most(found, campaign, kuka):
-    fitted, _ = found
-    payload = effect_of(fitted, "payload")
-    heavy = with_value(fitted, "payload", 20.0, 1.0)
-    assert state_largest_sag("payload", [payload], heavy, campaign.observations) == []
-    taken = declared_springs(heavy, kuka.compliance)
-    (entry,) = state_largest_sag("payload", [payload], taken, campaign.observations)
-    # Predictions with and without the mass, by the exact kinematics.
-    around = taken.conditions
-    light = with_value(taken, "payload", 0.0, 1.0)
-    positions = [
-        predict(each.model, each.estimate, campaign.observations, around)[0]
-        for each in (taken, light)
-    ]
-    largest = np.linalg.norm(positions[0] - positions[1], axis=1).max()
-    assert entry.unit == "m" and entry.value == pytest.approx(largest, rel=0.02)
-    assert entry.std_error == pytest.approx(entry.value / 20.0, rel=1e-3)
-    assert (
-        state_largest_sag(
-            "joint_tilt",
-            [effect_of(fitted, "joint_tilt@2")],
-            taken,
-            campaign.observations,
-        )
-        == []
-    )
+def test_sag_is_the_largest_displacement_of_a_target_by_the_weight(
+    fitted, campaign, kuka
+):
+    observations = campaign.observations
+    payload = find_effect(fitted, "payload")
+    heavy = replace_first_parameter(fitted, "payload", 20.0, 1.0)
+    assert state_largest_sag("payload", [payload], heavy, observations) == []
+    nominal = use_nominal_compliances(heavy, kuka.compliance)
+    (sag,) = state_largest_sag("payload", [payload], nominal, observations)
+    # Compare with predictions with and without the mass, by the exact kinematics.
+    conditions = nominal.conditions
+    light = replace_first_parameter(nominal, "payload", 0.0, 1.0)
+    model = nominal.model
+    position, _ = predict(model, nominal.estimate, observations, conditions)
+    light_position, _ = predict(model, light.estimate, observations, conditions)
+    largest = np.linalg.norm(position - light_position, axis=1).max()
+    assert sag.unit == "m"
+    assert sag.value == pytest.approx(largest, rel=0.02)
+    assert sag.std_error == pytest.approx(sag.value / 20.0, rel=1e-3)
+    tilt = find_effect(fitted, "joint_tilt@2")
+    assert state_largest_sag("joint_tilt", [tilt], nominal, observations) == []
 
 
-def test_the_wrong_sign_is_named(found):
-    fitted, entries = found
-    (warning,) = warn_of_implausible_values(
-        with_value(fitted, "joint_tilt@2", -1e-7, 1e-8), entries
-    )
-    assert (
-        warning.startswith("joint_tilt@2: tilt_about_")
-        and "by its physics positive" in warning
-    )
+def list_warnings(fitted):
+    """Warnings of the four effects of the fixture."""
+    keys = [effect.key for effect in fitted.model.effects][-4:]
+    return warn_of_implausible_values(fitted, keys)
 
 
-def test_a_size_beyond_what_such_an_effect_reaches_is_named(found):
-    fitted, entries = found
-    plausible = effect_of(fitted, "joint_offset@3").parameters[0].plausible
-    for sign in (1, -1):
-        (warning,) = warn_of_implausible_values(
-            with_value(
-                fitted, "joint_offset@3", 3.5 * sign * plausible, 0.1 * plausible
-            ),
-            entries,
-        )
-        assert (
-            warning.startswith("joint_offset@3: offset is")
-            and "3 times what such an effect reaches" in warning
-        )
-        large = with_value(
-            fitted, "joint_offset@3", 3.5 * sign * plausible, 0.1 * plausible
-        )
-        assert find_oversized_effects(large, {"joint_offset", "payload"}) == {
-            "joint_offset"
-        } and not find_oversized_effects(large, {"payload"})
-    assert (
-        warn_of_implausible_values(
-            with_value(fitted, "joint_offset@3", 3.1 * plausible, 0.1 * plausible),
-            entries,
-        )
-        == []
-    )
+def test_a_sign_against_physics_causes_a_warning(fitted):
+    negative = replace_first_parameter(fitted, "joint_tilt@2", -1e-7, 1e-8)
+    (warning,) = list_warnings(negative)
+    assert warning.startswith("joint_tilt@2: tilt_about_")
+    assert "by its physics positive" in warning
+
+
+def test_a_size_beyond_the_reach_of_an_effect_causes_a_warning(fitted):
+    key = "joint_offset@3"
+    plausible = find_effect(fitted, key).parameters[0].plausible
+    for size in (3.5 * plausible, -3.5 * plausible):
+        large = replace_first_parameter(fitted, key, size, 0.1 * plausible)
+        (warning,) = list_warnings(large)
+        assert warning.startswith("joint_offset@3: offset is")
+        assert "3 times what such an effect reaches" in warning
+        oversized = find_oversized_effects(large, {"joint_offset", "payload"})
+        assert oversized == {"joint_offset"}
+        assert not find_oversized_effects(large, {"payload"})
+    usual = replace_first_parameter(fitted, key, 3.1 * plausible, 0.1 * plausible)
+    assert list_warnings(usual) == []

@@ -129,6 +129,12 @@ def predict_positions(case, fitted, offset_of_joint_3):
     return positions
 
 
+def assert_residuals(block, stage, expected):
+    residual = np.column_stack([block[f"{stage}_d{axis}"] for axis in "xyz"])
+    np.testing.assert_allclose(residual, expected, rtol=0, atol=1e-9)
+    assert np.isnan(block[f"{stage}_rx"]).all()
+
+
 def test_residuals_are_measured_minus_predicted_positions_in_the_order_of_the_rows(
     cases_and_steps,
 ):
@@ -143,16 +149,10 @@ def test_residuals_are_measured_minus_predicted_positions_in_the_order_of_the_ro
             np.testing.assert_array_equal(block[name], getattr(measurements, name))
         position = np.column_stack([block[axis] for axis in "xyz"])
         np.testing.assert_array_equal(position, measurements.position)
-        for stage, fitted, offset_of_joint_3 in (
-            ("before", declared, 0.0),
-            ("after", final, offset),
-        ):
-            residual = np.column_stack([block[f"{stage}_d{axis}"] for axis in "xyz"])
-            predicted = predict_positions(measured_case, fitted, offset_of_joint_3)
-            np.testing.assert_allclose(
-                residual, measurements.position - predicted, rtol=0, atol=1e-9
-            )
-            assert np.isnan(block[f"{stage}_rx"]).all()
+        before = predict_positions(measured_case, declared, 0.0)
+        assert_residuals(block, "before", position - before)
+        after = predict_positions(measured_case, final, offset)
+        assert_residuals(block, "after", position - after)
     rows = np.concatenate([block["row"] for block in blocks])
     assert sorted(rows) == list(range(1, len(rows) + 1))
 
@@ -224,8 +224,8 @@ def test_poses_outside_the_fitted_range_are_counted_flagged_and_warned_of(
     by_range = document["heldout"]["outside_range"]
     count = document["heldout"]["poses"]
     assert 1 <= by_range["poses"] < count
-    for part in ("outside", "inside"):
-        assert by_range[part]["after"]["rms_m"] < 1e-3
+    for range_name in ("outside", "inside"):
+        assert by_range[range_name]["after"]["rms_m"] < 1e-3
     assert document["gross_errors"] == []
     sentence = f"{by_range['poses']} of {count} validation poses lie outside"
     assert sentence in document["warnings"][-1]

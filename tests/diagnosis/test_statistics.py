@@ -127,13 +127,13 @@ def test_badly_scaled_and_nearly_collinear_columns_cost_no_precision():
     norms = np.linalg.norm(augmented.astype(float), axis=0)
     basis = orthonormalize(augmented / norms)
     count = len(rows.residual)
-    others = np.zeros((len(augmented), 4), np.longdouble)
-    others[:count, :3] = rows.candidates
-    others[:count, 3] = rows.residual
-    others[count:, 3] = -rows.present / rows.prior_std
+    remaining = np.zeros((len(augmented), 4), np.longdouble)
+    remaining[:count, :3] = rows.candidates
+    remaining[:count, 3] = rows.residual
+    remaining[count:, 3] = -rows.present / rows.prior_std
     for _ in range(2):
-        others = others - basis @ (basis.T @ others)
-    exact = (others.T @ others).astype(float)
+        remaining = remaining - basis @ (basis.T @ remaining)
+    exact = (remaining.T @ remaining).astype(float)
     # Forming the normal equations would leave an error of 1e-4: the rounding times the
     # square of one over the collinearity.
     assert_close(computed.gram[0], exact[:3, :3], rtol=1e-7)

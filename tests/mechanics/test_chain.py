@@ -1,4 +1,4 @@
-"""The chain notation: what it means, and that every fault is refused in one line."""
+"""The chain notation: its meaning, and one-line errors for every fault."""
 
 import math
 
@@ -51,7 +51,7 @@ def test_faulty_chain_is_refused_in_one_line(text, words):
 
 
 @pytest.mark.parametrize("name", ["@SUM(A1)", "=1", "-x", "a\u202eb", "a\x1b[b"])
-def test_a_point_whose_name_a_table_or_a_terminal_takes_for_something_else_is_refused(
+def test_a_point_name_that_a_table_or_a_terminal_would_interpret_is_refused(
     name,
 ):
     with refused("a.yaml", "chain"):

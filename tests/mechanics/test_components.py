@@ -3,7 +3,7 @@
 from elastocal.mechanics.components import COMPONENTS, WRENCH
 
 
-def test_a_force_and_the_displacement_that_it_works_along_stand_at_the_same_place():
+def test_a_force_and_the_displacement_along_it_have_the_same_index():
     for (moved, unit, moves), (load, load_unit, loads) in zip(
         COMPONENTS, WRENCH, strict=True
     ):

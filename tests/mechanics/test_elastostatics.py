@@ -38,7 +38,7 @@ def test_offset_that_turns_with_the_tool_loads_the_joints_as_a_force_at_that_tar
     )
 
 
-def test_columns_of_the_regressor_are_those_of_equation_10(kuka):
+def test_regressor_has_the_columns_of_equation_10(kuka):
     loads = random_loads(kuka, 1, 3)
     jacobian = compute_poses_and_jacobians(
         kuka.chain, loads.joint_angles, kuka.chain.end_effector
@@ -46,14 +46,14 @@ def test_columns_of_the_regressor_are_those_of_equation_10(kuka):
     matrix = build_regressor(
         jacobian, compute_generalized_forces(jacobian, loads.wrench)
     )
-    inside = jacobian.copy()
+    in_place = jacobian.copy()
     assert (
         build_regressor(
-            inside, compute_generalized_forces(inside, loads.wrench), out=inside
+            in_place, compute_generalized_forces(in_place, loads.wrench), out=in_place
         )
-        is inside
+        is in_place
     )
-    np.testing.assert_array_equal(inside, matrix)
+    np.testing.assert_array_equal(in_place, matrix)
     for index in np.ndindex(1, 3):
         columns = [
             np.outer(column, column) @ loads.wrench[index]
@@ -67,42 +67,33 @@ def test_columns_of_the_regressor_are_those_of_equation_10(kuka):
 TUBE = Tube(0.25, 0.02, 70e9, 26e9)
 
 
-def integrated_beam(tube, along):
-    """Tip compliance of a round cantilever that runs along a vector, by adding up what
-    each slice gives way."""
-    length = np.linalg.norm(along)
-    direction = np.array(along) / np.linalg.norm(along)
+def integrated_beam(tube, vector):
+    """Tip compliance of a round cantilever along a vector, summed over its slices."""
+    length = np.linalg.norm(vector)
+    direction = np.array(vector) / length
     outer = tube.outer_diameter_m / 2
     inner = outer - tube.wall_m
     area = quad(lambda r: 2 * np.pi * r, inner, outer)[0]
     polar = quad(lambda r: 2 * np.pi * r**3, inner, outer)[0]
-    second = polar / 2
     axial = np.outer(direction, direction)
-    stretch = axial / (tube.youngs_modulus_Pa * area)
-    turn = axial / (tube.shear_modulus_Pa * polar) + (np.eye(3) - axial) / (
-        tube.youngs_modulus_Pa * second
+    # A slice stretches along the beam, twists about it and bends about the other axes.
+    slice_compliance = np.zeros((6, 6))
+    slice_compliance[:3, :3] = axial / (tube.youngs_modulus_Pa * area)
+    slice_compliance[3:, 3:] = axial / (tube.shear_modulus_Pa * polar)
+    slice_compliance[3:, 3:] += (np.eye(3) - axial) / (
+        tube.youngs_modulus_Pa * polar / 2
     )
-    total = np.zeros((6, 6))
-    nodes, weights = np.polynomial.legendre.leggauss(
-        4
-    )  # exact up to degree seven; the integrand is of degree two
+    compliance = np.zeros((6, 6))
+    # Four nodes are exact up to degree seven; the integrand has degree two.
+    nodes, weights = np.polynomial.legendre.leggauss(4)
     for node, weight in zip(nodes, weights, strict=True):
-        lever = 0.5 * (1 - node) * length * direction  # from the slice to the tip
-        cross = np.array(
-            [
-                [0, -lever[2], lever[1]],
-                [lever[2], 0, -lever[0]],
-                [-lever[1], lever[0], 0],
-            ]
-        )
+        x, y, z = 0.5 * (1 - node) * length * direction  # from the slice to the tip
         # A slice that stretches by s and turns by t moves the tip by s + t x lever and
         # turns it by t.
-        moves = np.block([[np.eye(3), -cross], [np.zeros((3, 3)), np.eye(3)]])
-        slice_compliance = np.block(
-            [[stretch, np.zeros((3, 3))], [np.zeros((3, 3)), turn]]
-        )
-        total += 0.5 * weight * length * moves @ slice_compliance @ moves.T
-    return total
+        motion = np.eye(6)
+        motion[:3, 3:] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]
+        compliance += 0.5 * weight * length * motion @ slice_compliance @ motion.T
+    return compliance
 
 
 @pytest.mark.parametrize(
@@ -122,7 +113,7 @@ def test_tube_compliance_is_that_of_an_integrated_beam(tube, length):
 def test_extended_deflection_is_that_of_joints_and_beams_added_up(kuka_extended):
     loads = random_loads(kuka_extended, 1, 5, force=1.0)
     point = kuka_extended.chain.end_effector
-    found = compute_true_deflections(kuka_extended, loads, point, "end_effector")
+    deflection = compute_true_deflections(kuka_extended, loads, point, "end_effector")
     expected = compute_true_deflections(
         replace(kuka_extended, links=()), loads, point, "end_effector"
     )
@@ -146,7 +137,7 @@ def test_extended_deflection_is_that_of_joints_and_beams_added_up(kuka_extended)
             expected[index] += np.concatenate(
                 [tip[:3] + np.cross(tip[3:], lever), tip[3:]]
             )
-    # One newton keeps what is of second order below 1e-11 m; differences of poses round
-    # at 1e-15 m.
-    np.testing.assert_allclose(found, expected, rtol=0, atol=2e-11)
+    # With one newton, second-order terms are below 1e-11 m; differences of poses have
+    # rounding errors of 1e-15 m.
+    np.testing.assert_allclose(deflection, expected, rtol=0, atol=2e-11)
     assert np.abs(expected).max() > 1e-7

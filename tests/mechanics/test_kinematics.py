@@ -1,5 +1,5 @@
-"""Equations 1-4 and what moves behind joints: against pinocchio, finite differences,
-scipy, the paper's own products."""
+"""Equations 1-4 and Jacobians against pinocchio, scipy and the products that the paper
+prints."""
 
 from dataclasses import replace
 
@@ -26,8 +26,8 @@ from elastocal.mechanics.kinematics import (
     compute_rotation_vectors,
 )
 
-# Metres and radians of order one through a dozen products: some tens of roundings of
-# 1e-16.
+# Tolerance, m and rad: a dozen products of values of order one have some tens of
+# rounding errors of 1e-16.
 ROUNDING = 2e-14
 
 
@@ -35,7 +35,7 @@ ROUNDING = 2e-14
 def chain_texts(draw):
     """Chains of one to eight joints with carriages, translations, fixed rotations and
     points anywhere."""
-    words = []
+    tokens = []
     points = 0
     joints = draw(st.integers(1, 8))
     for joint in range(1, joints + 1):
@@ -44,23 +44,23 @@ def chain_texts(draw):
             axis = draw(st.sampled_from("xyz"))
             if kind == "P":
                 points += 1
-                words.append(f"[point{points}]")
+                tokens.append(f"[point{points}]")
             elif kind == "T":
-                words.append(f"T{axis}({sign}{draw(st.integers(0, 2000)) / 1000:.3f})")
+                tokens.append(f"T{axis}({sign}{draw(st.integers(0, 2000)) / 1000:.3f})")
             else:
-                words.append(f"R{axis}({sign}{draw(st.integers(0, 360))}deg)")
+                tokens.append(f"R{axis}({sign}{draw(st.integers(0, 360))}deg)")
         kind, axis, sign = (
             draw(st.sampled_from(choices)) for choices in ("RRT", "xyz", ["", "-"])
         )
-        words.append(f"{kind}{axis}({sign}q{joint})")
-    return " ".join([*words, f"Tx({draw(st.integers(0, 500)) / 1000:.3f})", "[end]"])
+        tokens.append(f"{kind}{axis}({sign}q{joint})")
+    return " ".join([*tokens, f"Tx({draw(st.integers(0, 500)) / 1000:.3f})", "[end]"])
 
 
 @given(chain_texts(), st.integers(0, 2**32 - 1))
 def test_random_chains_agree_with_pinocchio(text, seed):
     chain = chain_of(text)
-    # Component first in memory, so that the package may work on the angles themselves
-    # and not on a copy.
+    # Angles that are component first in memory are not copied; the package must not
+    # change them.
     angles = np.asfortranarray(random_angles(np.random.default_rng(seed), chain, 3))
     before = angles.copy()
     for point in (chain.points[0], chain.end_effector):
@@ -166,15 +166,15 @@ def test_motion_gives_the_jacobian_of_every_point_and_the_forces_of_every_wrench
         np.testing.assert_allclose(
             np.moveaxis(moved.rotation[number], -1, 0), rotation, rtol=0, atol=ROUNDING
         )
-        found = moved.jacobian(point.after, moved.position[number])
+        full = moved.jacobian(point.after, moved.position[number])
         np.testing.assert_allclose(
-            np.moveaxis(found, -1, 0), jacobian, rtol=0, atol=ROUNDING
+            np.moveaxis(full, -1, 0), jacobian, rtol=0, atol=ROUNDING
         )
-        some = moved.jacobian(
+        subset = moved.jacobian(
             point.after, moved.position[number][:, [4, 1, 1]], 3, np.array([4, 1, 1])
         )
         np.testing.assert_allclose(
-            np.moveaxis(some, -1, 0), jacobian[[4, 1, 1], :3], rtol=0, atol=ROUNDING
+            np.moveaxis(subset, -1, 0), jacobian[[4, 1, 1], :3], rtol=0, atol=ROUNDING
         )
         moment = wrench[:, 3:] + np.cross(position, wrench[:, :3])
         acting = np.concatenate([wrench[:, :3], moment], axis=1).T

@@ -28,7 +28,7 @@ def test_reported_angles_are_converted_both_ways():
 
 
 @pytest.mark.parametrize("name", ["kuka", "fanuc", "fanuc_measured"])
-def test_published_compliances_are_within_a_factor_of_five_of_the_usual_ones(
+def test_published_compliances_are_within_a_factor_of_five_of_typical_ones(
     name, config_folder
 ):
     robot = parse_robot(read_document(config_folder / "robots" / f"{name}.yaml"))

@@ -1,5 +1,4 @@
-"""The robot file: what it means, that every fault is refused in one line, and the way
-back to it."""
+"""The robot file: its meaning, one-line errors for every fault, and writing it."""
 
 from copy import deepcopy
 
@@ -52,7 +51,7 @@ def document(**changes):
     return {key: value for key, value in changed.items() if value is not None}
 
 
-def test_robot_file_comes_in_si_units():
+def test_robot_file_is_converted_to_si_units():
     robot = parse_robot(document())
     assert robot.joints == 2 and robot.links == ()
     np.testing.assert_allclose(robot.compliance, [1.5e-6, 2.5e-6], rtol=1e-15)
@@ -65,7 +64,7 @@ def test_robot_file_comes_in_si_units():
     np.testing.assert_allclose(unlimited, [[-2 * np.pi, 2 * np.pi]] * 2, rtol=1e-15)
 
 
-def test_without_compliances_the_usual_ones_are_there_as_not_known_and_never_written():
+def test_without_compliances_typical_ones_count_as_unknown_and_are_never_written():
     robot = parse_robot(document(compliance_urad_per_Nm=None, payload_kg=20))
     np.testing.assert_allclose(
         robot.compliance, estimate_typical_compliance(robot.chain, 20.0), rtol=1e-15
@@ -140,14 +139,14 @@ def test_without_compliances_the_usual_ones_are_there_as_not_known_and_never_wri
             "links.tubes",
             ["0.101", "half"],
         ),
-        # Tubes bend where no link changes its length or turns by itself.
+        # Tubes need links that neither change their length nor have fixed rotations.
         *(
             (
                 {"chain": chain, "lengths_m": None, "links": TUBES},
                 "links",
-                [what, "turn at their joints only"],
+                [feature, "turn at their joints only"],
             )
-            for chain, what in (
+            for chain, feature in (
                 ("Rz(q1) Tx(1) Rx(90deg) [A] Ry(q2) Tx(1) [B]", "fixed rotations"),
                 ("Tx(q1) Tz(0.5) Rz(q2) Tx(1) [B]", "prismatic joints"),
             )
@@ -187,11 +186,11 @@ def test_faulty_robot_file_is_refused_in_one_line(changes, key, words):
 
 
 @pytest.mark.parametrize(
-    "more",
+    "changes",
     [{}, WEIGHED, TRACKED, REPORTED],
 )
-def test_robot_becomes_a_document_that_gives_it_back(more):
-    robot = parse_robot(document(**more))
+def test_a_described_robot_parses_to_the_same_robot(changes):
+    robot = parse_robot(document(**changes))
     written = describe_robot(robot)
     check_document(written, "robot", "robot.yaml")
     again = parse_robot(written)

@@ -1,5 +1,5 @@
-"""Sites: the chain that holds every deviation against the robot's own chain, finite
-differences, pinocchio and the eye."""
+"""Sites: the chain with all deviations against the chain of the robot, and the links
+that each joint carries."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def chain(request, chain_called):
 
 
 def extended(sites, angles):
-    """Coordinates of the sites with nothing but joint angles."""
+    """Coordinates of the sites with joint angles and zeros."""
     return np.concatenate(
         [
             angles,
@@ -34,13 +34,15 @@ def test_sites_at_zero_leave_the_poses_and_jacobians_of_the_robot(name, chain_ca
     sites = build_sites(robot_on(chain))
     angles = random_angles(np.random.default_rng(0), chain, 2, 3)
     assert [p.name for p in sites.chain.points] == [p.name for p in chain.points]
-    for ours, point in zip(sites.chain.points, chain.points, strict=True):
+    for site_point, point in zip(sites.chain.points, chain.points, strict=True):
         expected = compute_poses_and_jacobians(chain, angles, point)
-        found = compute_poses_and_jacobians(sites.chain, extended(sites, angles), ours)
-        np.testing.assert_allclose(found[0], expected[0], rtol=0, atol=ROUNDING)
-        np.testing.assert_allclose(found[1], expected[1], rtol=0, atol=ROUNDING)
+        actual = compute_poses_and_jacobians(
+            sites.chain, extended(sites, angles), site_point
+        )
+        np.testing.assert_allclose(actual[0], expected[0], rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(actual[1], expected[1], rtol=0, atol=ROUNDING)
         np.testing.assert_allclose(
-            found[2][..., : sites.joints], expected[2], rtol=0, atol=ROUNDING
+            actual[2][..., : sites.joints], expected[2], rtol=0, atol=ROUNDING
         )
 
 
@@ -56,11 +58,11 @@ def test_tilt_about_the_axis_of_a_joint_is_the_joint_itself(chain):
     turning = [t for t in chain.transforms if t.coordinate is not None]
     for joint, transform in enumerate(turning):
         assert sites.joint_axes[joint] == transform.axis
-        about = sites.tilt[joint][sites.joint_axes[joint]]
+        tilt_axis = sites.tilt[joint][sites.joint_axes[joint]]
         for point in chain.points:
-            alone, own = columns_at(sites, angles, point.name, [about, joint]).T
+            tilt, turn = columns_at(sites, angles, point.name, [tilt_axis, joint]).T
             np.testing.assert_allclose(
-                transform.sign * alone, own, rtol=0, atol=ROUNDING
+                transform.sign * tilt, turn, rtol=0, atol=ROUNDING
             )
 
 
@@ -71,8 +73,8 @@ def test_point_at_the_end_of_a_link_moves_with_it(fanuc, point, link):
     sites = build_sites(fanuc)
     angles = random_angles(np.random.default_rng(5), fanuc.chain)
     rotation = compute_poses(fanuc.chain, angles, fanuc.chain.point(point))[1]
-    # At its own origin a site shifts and turns a point along the axes that they share,
-    # and nothing else.
+    # A site at the origin of a point shifts and turns it along the axes of their common
+    # frame.
     expected = np.kron(np.eye(2), rotation)
     np.testing.assert_allclose(
         columns_at(sites, angles, point, sites.link_end[link]),
@@ -90,7 +92,7 @@ CARRIED = {
     "fanuc": [[], [2, 3, 6], [3, 6], [6], [6], []],
     "three joints": [[], [2, 3], [3]],
     "seven joints": [[], [2, 4, 6, 7], [4, 6, 7], [4, 6, 7], [6, 7], [6, 7], [7]],
-    # Joints 1 and 2 of the fixed rotations lie level: the first one is the shoulder.
+    # Joints 1 and 2 of this chain are horizontal, so the first one is the shoulder.
     "fixed rotations": [[1, 2, 3, 4], [2, 3, 4], [3, 4], [4]],
 }
 
@@ -99,11 +101,11 @@ CARRIED = {
 def test_carried_links_are_those_whose_weight_can_turn_the_joint(name, chain_called):
     sites = build_sites(robot_on(chain_called(name)))
     lengths = np.linalg.norm(sites.link_vectors_m, axis=1)
-    expected = [
-        [link for link in links if lengths[link] > 0] for links in CARRIED[name]
-    ]
+    expected = []
+    for links in CARRIED[name]:
+        expected.append([link for link in links if lengths[link] > 0])
     assert [sites.carried_links(joint) for joint in range(sites.joints)] == expected
-    # The first that carries weight.
+    # The shoulder is the first joint that carries weight.
     assert sites.shoulder == next(
         joint for joint, links in enumerate(expected) if links
     )

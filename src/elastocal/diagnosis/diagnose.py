@@ -437,9 +437,9 @@ def _is_linear(start: _SearchRound, evidence: Evidence, settings: Settings) -> b
     is missing, that the same effects were named before, or that the exact fit keeps
     what the linear problem promised.
     """
-    noise_ratio = evidence.fitted.noise.position_m / start.reference.noise.position_m
+    largest_m = settings.relinearize_noise * start.reference.noise.position_m
     named = evidence.conclusion.best.named
-    if noise_ratio > settings.relinearize_noise:
+    if evidence.fitted.noise.position_m > largest_m:
         return False
     if evidence.alarm.statistic < settings.relinearize_above:
         return True

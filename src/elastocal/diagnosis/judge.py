@@ -311,9 +311,9 @@ def compare_held_out_errors(
     intervals, reductions = compute_error_intervals(
         errors, _REPLICATES, stream, declared
     )
-    calibration = compute_error_intervals([errors[0], errors[-1]], _REPLICATES, stream)[
-        1
-    ][1]
+    _, (_, calibration) = compute_error_intervals(
+        [errors[0], errors[-1]], _REPLICATES, stream
+    )
     floor = compute_noise_floor(
         steps[-1].fitted, held_out.observations, *transferred[-1]
     )

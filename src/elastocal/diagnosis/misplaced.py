@@ -196,45 +196,42 @@ def find_misplaced_frames(fitted: Fit, campaign: Campaign) -> list[MisplacedFram
     largest_turn = np.abs(parameters.values[parameters.is_turn]).max(initial=0.0)
     if is_usual[list(parameters.frames)].all() or largest_turn > _LARGEST_TURN:
         return []
-    wrong = _find_wrong_shifts(_NormalEquations.of_fit(fitted, parameters))
+    wrong, values, alternatives = _find_wrong_shifts(
+        _NormalEquations.of_fit(fitted, parameters)
+    )
     misplaced = []
-    for frame, alternatives in wrong.alternatives.items():
-        indices = [n for n in wrong.indices if parameters.frames[n] == frame]
+    for frame, alternative_frames in alternatives.items():
+        indices = [n for n in wrong if parameters.frames[n] == frame]
         shift_m = np.zeros(3)
         axes = ["xyz".index(parameters.axes[n]) for n in indices]
-        shift_m[axes] = wrong.values[indices]
+        shift_m[axes] = values[indices]
         usual_m = parameters.usual_sizes[indices].max()
         sizes = float(np.linalg.norm(shift_m) / usual_m)
         if sizes > _MOST_SIZES:
-            sentence = _describe_frame(frame, alternatives, shift_m, sizes, campaign)
+            sentence = _describe_frame(
+                frame, alternative_frames, shift_m, sizes, campaign
+            )
             misplaced.append(
                 MisplacedFrame(
-                    frame, alternatives, tuple(shift_m.tolist()), sizes, sentence
+                    frame, alternative_frames, tuple(shift_m.tolist()), sizes, sentence
                 )
             )
     return misplaced
 
 
-@dataclass(frozen=True)
-class _WrongShifts:
-    """Shifts that were declared wrongly.
+def _find_wrong_shifts(
+    equations: _NormalEquations,
+) -> tuple[list[int], np.ndarray, dict[str, tuple[str, ...]]]:
+    """Declare shifts as wrong, one after the other, as long as each makes the
+    measurements more probable.
 
-    Attributes
-    ----------
-    indices : of their parameters
+    Returns
+    -------
+    indices : of the parameters of these shifts
     values : (N,), most probable parameters with these shifts
     alternatives : by frame, the other frames whose shift explains the measurements as
         well
     """
-
-    indices: list[int]
-    values: np.ndarray
-    alternatives: dict[str, tuple[str, ...]]
-
-
-def _find_wrong_shifts(equations: _NormalEquations) -> _WrongShifts:
-    """Declare shifts as wrong, one after the other, as long as each makes the
-    measurements more probable."""
     frames = equations.parameters.frames
     wrong: list[int] = []
     equivalent_frames: dict[str, set[str]] = {}
@@ -263,7 +260,7 @@ def _find_wrong_shifts(equations: _NormalEquations) -> _WrongShifts:
         frame: tuple(sorted(equivalent - {frame}))
         for frame, equivalent in equivalent_frames.items()
     }
-    return _WrongShifts(wrong, explanation.values, alternatives)
+    return wrong, explanation.values, alternatives
 
 
 def _list_shifts(frames: dict[int, str]) -> list[tuple[int, ...]]:

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from elastocal.diagnosis.statistics import get_elimination
-from elastocal.fitting.observations import batch_groups_by_size
+from elastocal.diagnosis.statistics import get_elimination, project_on_axes
 
 if TYPE_CHECKING:
     from elastocal.diagnosis.statistics import CrossProducts, PoseBlock
@@ -41,7 +40,9 @@ def simulate_null_statistics(
     equations = _SimulatedEquations(products, white, np.asarray(pose_error_rad))
     joints = products.rows.jacobian.shape[2]
     for block in products.iterate_poses():
-        noise = _project_on_axes(block, white[block.selected])
+        noise = project_on_axes(
+            block.rows.jacobian, block.rows.pose, white[block.selected]
+        ).reshape(-1, count)
         if tau:
             # The joint errors of a pose are as independent along its principal axes as
             # they are joint by joint.
@@ -129,16 +130,3 @@ def _project_on_columns(products: CrossProducts, white: np.ndarray) -> np.ndarra
     candidates = products.rows.candidates.times(white)
     candidates = candidates - products.projections[:, :-1].T @ declared
     return np.concatenate([declared, candidates])
-
-
-def _project_on_axes(block: PoseBlock, white: np.ndarray) -> np.ndarray:
-    """Products (G a, N) of the Jacobian along the principal axes of each pose with
-    white noise (M, rows, N)."""
-    poses, axes = block.eigenvalues.shape
-    count = white.shape[2]
-    by_pose = np.empty((poses, axes, count))
-    for members in batch_groups_by_size(block.rows.pose):
-        jacobian = block.rows.jacobian[members].reshape(len(members), -1, axes)
-        noise = white[members].reshape(len(members), -1, count)
-        by_pose[block.rows.pose[members[:, 0]]] = jacobian.transpose(0, 2, 1) @ noise
-    return by_pose.reshape(-1, count)

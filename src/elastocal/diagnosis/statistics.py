@@ -209,17 +209,16 @@ class CrossProducts:
         eigenvalues = np.empty((poses, axes))
         for members in batch_groups_by_size(rows.pose):
             pose = rows.pose[members[:, 0]]
-            flat = (len(members), members.shape[1] * rows.jacobian.shape[1], -1)
-            by_joint = rows.jacobian[members].reshape(flat)
+            by_joint = rows.jacobian[members].reshape(
+                len(members), -1, rows.jacobian.shape[2]
+            )
             values, vectors = np.linalg.eigh(by_joint.transpose(0, 2, 1) @ by_joint)
             eigenvalues[pose] = values[:, -axes:]
             by_axis = by_joint @ vectors[..., -axes:]
             jacobian[members] = by_axis.reshape(*members.shape, *jacobian.shape[1:])
-            dense = by_axis.transpose(0, 2, 1) @ basis_and_residual[members].reshape(
-                flat
-            )
-            products[pose, :, :declared] = dense[..., :-1]
-            products[pose, :, -1] = dense[..., -1]
+        dense = project_on_axes(jacobian, rows.pose, basis_and_residual)
+        products[..., :declared] = dense[..., :-1]
+        products[..., -1] = dense[..., -1]
         products[..., declared:-1] = rows.candidates.multiply_by_pose(
             jacobian, rows.pose
         )
@@ -232,6 +231,20 @@ class CrossProducts:
             products,
             np.maximum(eigenvalues, 0.0),
         )
+
+
+def project_on_axes(
+    jacobian: np.ndarray, pose: np.ndarray, values: np.ndarray
+) -> np.ndarray:
+    """Multiply the Jacobian (M, rows, a) along the principal axes of each pose with
+    some values (M, rows, N): products (G, a, N) of the poses."""
+    axes = jacobian.shape[2]
+    products = np.empty((pose.max() + 1, axes, values.shape[2]))
+    for members in batch_groups_by_size(pose):
+        by_axis = jacobian[members].reshape(len(members), -1, axes)
+        by_pose = values[members].reshape(len(members), -1, values.shape[2])
+        products[pose[members[:, 0]]] = by_axis.transpose(0, 2, 1) @ by_pose
+    return products
 
 
 def compute_cross_products(

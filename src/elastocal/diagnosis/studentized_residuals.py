@@ -92,12 +92,6 @@ class _RowBlock:
     noise_covariance: np.ndarray
     joint_covariance: np.ndarray
 
-    def compute_whitener(self, pose_rad: float) -> np.ndarray:
-        """Inverse Cholesky factors of the row covariances, (m, c, c), for a pose error
-        of `pose_rad` in each joint."""
-        covariance = self.noise_covariance + pose_rad**2 * self.joint_covariance
-        return np.linalg.inv(np.linalg.cholesky(covariance))
-
 
 @dataclass(frozen=True)
 class StudentizedResiduals:
@@ -178,7 +172,13 @@ class StudentizedResiduals:
         return distance
 
     def _compute_whiteners(self, noise: Noise) -> list[np.ndarray]:
-        return [block.compute_whitener(noise.pose_rad) for block in self.blocks]
+        """Inverse Cholesky factors of the row covariances, (m, c, c) for each block."""
+        whiteners = []
+        for block in self.blocks:
+            joint_covariance = noise.pose_rad**2 * block.joint_covariance
+            covariance = block.noise_covariance + joint_covariance
+            whiteners.append(np.linalg.inv(np.linalg.cholesky(covariance)))
+        return whiteners
 
     def _compute_parameter_covariance(
         self, fitted: Fit, whiteners: list[np.ndarray]

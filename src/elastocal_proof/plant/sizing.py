@@ -167,27 +167,30 @@ def _linearize(
     """
     mujoco_model = model.model
     data = mujoco.MjData(mujoco_model)
-    gear = model.gear
     translation = np.empty((3, mujoco_model.nv))
     rotation = np.empty((3, mujoco_model.nv))
-    min_distance_m = _WIDTH_OF_REACH * robot.arm.reach_m
-    jacobian = np.empty((len(coordinates), len(model.sites), 6, len(gear)))
-    torques = np.empty((len(declared), 4, len(coordinates), len(gear)))
-    for state, row in enumerate(coordinates):
-        data.qpos[:] = row
+    jacobian = np.empty((len(coordinates), len(model.sites), 6, len(model.gear)))
+    torques = np.empty((len(declared), 4, len(coordinates), len(model.gear)))
+    for state in range(len(coordinates)):
+        data.qpos[:] = coordinates[state]
         mujoco.mj_kinematics(mujoco_model, data)
         mujoco.mj_comPos(mujoco_model, data)
         for point, site in enumerate(model.sites):
             mujoco.mj_jacSite(mujoco_model, data, translation, rotation, site)
-            jacobian[state, point, :3] = translation[:, gear]
-            jacobian[state, point, 3:] = rotation[:, gear]
+            jacobian[state, point] = np.vstack([translation, rotation])[:, model.gear]
         for torque, mass in zip(torques[:, :, state], declared, strict=True):
             body = mujoco_model.body(f"arm{mass.link}" if mass.link else "foot").id
             axes = data.xmat[body].reshape(3, 3)
-            centre = data.xpos[body] + axes @ mass.centre_m
-            mujoco.mj_jac(mujoco_model, data, translation, rotation, centre, body)
+            mujoco.mj_jac(
+                mujoco_model,
+                data,
+                translation,
+                rotation,
+                data.xpos[body] + axes @ mass.centre_m,
+                body,
+            )
             weight = mass.mass_kg * np.array(mujoco_model.opt.gravity)
-            torque[0] = mass.relative_std * (weight @ translation[:, gear])
-            moments = np.cross(axes.T, weight) * mass.centre_std_m(min_distance_m)
-            torque[1:] = moments @ rotation[:, gear]
-    return jacobian, [*torques.reshape(-1, len(coordinates), len(gear))]
+            torque[0] = mass.relative_std * (weight @ translation[:, model.gear])
+            std_m = mass.centre_std_m(_WIDTH_OF_REACH * robot.arm.reach_m)
+            torque[1:] = np.cross(axes.T, weight) * std_m @ rotation[:, model.gear]
+    return jacobian, [*torques.reshape(-1, len(coordinates), len(model.gear))]
