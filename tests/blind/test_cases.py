@@ -92,11 +92,8 @@ def test_the_full_size_has_the_robots_null_cases_and_settings_of_the_protocol(
 
 def test_the_full_size_has_the_effects_and_levels_of_the_protocol(full_size):
     def count(group, **fields):
-        return sum(
-            case.group == group
-            and all(getattr(case, name) == value for name, value in fields.items())
-            for case in full_size
-        )
+        expected = {"group": group, **fields}.items()
+        return sum(expected <= vars(case).items() for case in full_size)
 
     for effect in CATALOGUE_EFFECTS:
         # One of the two robots has no gravity compensator, so no wrong one either.

@@ -73,29 +73,34 @@ def twelve_poses(request, fanuc):
 
 
 @pytest.mark.parametrize(
-    ("kept", "words"),
+    ("kept", "phrase"),
     [((0, 0, 0), "x, y, z of"), ((1, 1, 0), "z of"), ((0, 1, 0), "x, z of")],
 )
 @pytest.mark.parametrize(("value", "same"), [(0.0, "zero"), (1.5, "the same")])
-def test_positions_that_stand_still_are_named(twelve_poses, kept, words, value, same):
+def test_positions_that_stand_still_are_named(twelve_poses, kept, phrase, value, same):
     still = np.where(kept, twelve_poses.measurements.position, value)
     (fault,) = find_constant_columns(
         replace_measured_columns(twelve_poses, position=still)
     )
     assert fault.name == "constant_columns"
-    assert fault.detail.startswith(words) and f" {same} in all 12 poses" in fault.detail
+    assert (
+        fault.detail.startswith(phrase) and f" {same} in all 12 poses" in fault.detail
+    )
 
 
-def test_angles_that_stand_still_while_the_measurements_move_are_named_unless_it_is_one_pose_read_again(
+def test_constant_angles_are_a_fault_unless_one_pose_was_measured_repeatedly(
     twelve_poses,
 ):
-    seen = twelve_poses.measurements
+    measured_rows = twelve_poses.measurements
     still = replace_measured_columns(
-        twelve_poses, joint_angles=np.full_like(seen.joint_angles, 0.4)
+        twelve_poses, joint_angles=np.full_like(measured_rows.joint_angles, 0.4)
     )
     (fault,) = find_constant_columns(still)
     assert fault.detail.startswith("the joint angles are the same in all 12 poses")
-    again = seen.position[: len(POINTS)][seen.target] + 1e-5 * seen.pose[:, None]
+    again = (
+        measured_rows.position[: len(POINTS)][measured_rows.target]
+        + 1e-5 * measured_rows.pose[:, None]
+    )
     assert find_constant_columns(replace_measured_columns(still, position=again)) == []
 
 
@@ -124,22 +129,22 @@ def campaign(request, fanuc):
 
 
 def with_rows(campaign, source):
-    seen = campaign.measurements
+    measured_rows = campaign.measurements
     return replace_measured_columns(
         campaign,
-        position=seen.position[source],
-        rotation_vector=seen.rotation_vector[source],
+        position=measured_rows.position[source],
+        rotation_vector=measured_rows.rotation_vector[source],
     )
 
 
 @pytest.mark.parametrize(
-    ("steps", "words"), [(1, "row further up"), (-1, "row further down")]
+    ("steps", "phrase"), [(1, "row further up"), (-1, "row further down")]
 )
-def test_measured_columns_moved_by_one_row_are_named(campaign, steps, words):
+def test_measured_columns_moved_by_one_row_are_named(campaign, steps, phrase):
     (fault,) = find_faults(
         with_rows(campaign, np.roll(np.arange(len(campaign.measurements)), steps))
     )
-    assert fault.name == "shuffled_rows" and words in fault.detail
+    assert fault.name == "shuffled_rows" and phrase in fault.detail
 
 
 @pytest.mark.parametrize("tracker", [True, False])
@@ -150,7 +155,7 @@ def test_measurements_of_another_robot_are_named_and_those_of_one_off_by_centime
     (fault,) = find_implausible_measurements(replace(campaign, robot=kuka))
     assert fault.name == "implausible_measurements"
     assert fault.parameters[0].value > 0.1 and "\n" not in fault.detail
-    off = make_campaign(
+    deviating = make_campaign(
         fanuc,
         1,
         Plan(poses=20, tracker=tracker),
@@ -158,13 +163,13 @@ def test_measurements_of_another_robot_are_named_and_those_of_one_off_by_centime
         5e-3,
         sag=5e-3,
     )
-    assert find_implausible_measurements(off) == []
+    assert find_implausible_measurements(deviating) == []
 
 
-def warned(robot, factors=1.0, turned=1.0, known=True):
+def warned(robot, factors=1.0, turned=1.0, *, is_known=True):
     """Warnings of a fit of the compliances of a robot that are so many times those that
     its file states, or are usual."""
-    file = replace(robot, compliance_known=known)
+    file = replace(robot, compliance_known=is_known)
     campaign = make_campaign(
         file, 1, Plan(poses=12), replace(robot, compliance=robot.compliance * factors)
     )
@@ -181,7 +186,7 @@ def warned(robot, factors=1.0, turned=1.0, known=True):
 
 
 @pytest.mark.parametrize(
-    ("factor", "known", "words"),
+    ("factor", "is_known", "phrase"),
     [
         (0.3, True, ""),
         (3.0, True, ""),
@@ -191,23 +196,23 @@ def warned(robot, factors=1.0, turned=1.0, known=True):
     ],
 )
 def test_a_compliance_that_no_robot_has_is_named_with_its_standard_error(
-    fanuc, factor, known, words
+    fanuc, factor, is_known, phrase
 ):
-    found = warned(fanuc, [1, factor, 1, 1, 1, 1], known=known)
-    assert len(found) == bool(words)
-    for warning in found:
+    reported = warned(fanuc, [1, factor, 1, 1, 1, 1], is_known=is_known)
+    assert len(reported) == bool(phrase)
+    for warning in reported:
         assert (
             "joint 2 " in warning
             and "joint 3" not in warning
             and "±" in warning
-            and words in warning
+            and phrase in warning
         )
 
 
 def test_loads_turned_round_are_seen_by_compliances_below_zero_and_joints_without_any_are_rigid(
     fanuc,
 ):
-    (warning,) = warned(fanuc, turned=-1.0, known=False)
+    (warning,) = warned(fanuc, turned=-1.0, is_known=False)
     assert (
         all(f"joint {joint} -" in warning for joint in range(1, 7))
         and "usual for such a robot" in warning
@@ -260,16 +265,19 @@ def exact(fanuc):
     return make_campaign(fanuc, 1, EXACT)
 
 
-def expected_parts(robot, seen, part):
+def expected_parts(robot, measured_rows, components):
     """Deflection of each target by each joint at nominal compliance from forces or
     moments alone, ndarray (N, 3, n)."""
     end = PinocchioPoint(robot.chain, robot.chain.end_effector)
     points = [PinocchioPoint(robot.chain, robot.chain.point(name)) for name in POINTS]
     parts = []
     for q, wrench, target in zip(
-        seen.joint_angles, seen.wrench, seen.target, strict=True
+        measured_rows.joint_angles,
+        measured_rows.wrench,
+        measured_rows.target,
+        strict=True,
     ):
-        torques = end.pose_and_jacobian(q)[2][part].T @ wrench[part]
+        torques = end.pose_and_jacobian(q)[2][components].T @ wrench[components]
         parts.append(
             points[target].pose_and_jacobian(q)[2][:3] * torques * robot.compliance
         )
@@ -289,17 +297,17 @@ def less_group_means(values, *keys):
 def test_deflections_are_those_of_each_joint_by_pinocchio_less_the_mean_of_target_and_pose(
     fanuc, exact
 ):
-    seen = exact.measurements
-    found, expected = compute_deflections(exact)
-    for by, part in ((0, slice(0, 3)), (1, slice(3, 6))):
-        whole = expected_parts(fanuc, seen, part).sum(axis=2)
-        reference = less_group_means(whole, seen.pose, seen.target)
+    measured_rows = exact.measurements
+    measured, expected = compute_deflections(exact)
+    for by, components in ((0, slice(0, 3)), (1, slice(3, 6))):
+        whole = expected_parts(fanuc, measured_rows, components).sum(axis=2)
+        reference = less_group_means(whole, measured_rows.pose, measured_rows.target)
         np.testing.assert_allclose(
             expected[:, by].reshape(-1, 3), reference, rtol=0, atol=1e-12
         )
     # Second order in turns of some milliradians over metres.
-    np.testing.assert_allclose(found, expected.sum(axis=1), rtol=0, atol=2e-4)
-    assert np.abs(found).max() > 1e-3
+    np.testing.assert_allclose(measured, expected.sum(axis=1), rtol=0, atol=2e-4)
+    assert np.abs(measured).max() > 1e-3
 
 
 def selected(campaign, kept):
@@ -308,28 +316,30 @@ def selected(campaign, kept):
 
 def test_joints_off_their_zeros_leave_no_trace_in_the_deflections(fanuc):
     plan = Plan(poses=40, loads=1, noise=0.0)
-    straight, off = (
+    straight, deviating = (
         make_campaign(fanuc, 1, plan, true_offset=offset)
         for offset in (0.0, 2e-3 * np.array([1, -1, 1, -1, 1, -1]))
     )
     assert (
         np.linalg.norm(
-            off.measurements.position - straight.measurements.position, axis=1
+            deviating.measurements.position - straight.measurements.position, axis=1
         ).max()
         > 3e-3
     )
-    (one, _), (other, _) = map(compute_deflections, (straight, off))
+    (one, _), (second, _) = map(compute_deflections, (straight, deviating))
     # What is left is of second order: two milliradians of every deflection.
-    assert np.abs(other - one).max() < 0.02 * np.abs(one).max()
+    assert np.abs(second - one).max() < 0.02 * np.abs(one).max()
 
 
-def test_nothing_is_said_without_differing_loads_or_known_compliances_or_with_too_few_poses(
+def test_without_differing_loads_known_compliances_or_enough_poses_there_is_no_result(
     exact,
 ):
-    seen = exact.measurements
-    assert compute_deflections(selected(exact, seen.load == 1)) is None
+    measured_rows = exact.measurements
+    assert compute_deflections(selected(exact, measured_rows.load == 1)) is None
     assert (
-        compute_deflections(replace_measured_columns(exact, wrench=0.0 * seen.wrench))
+        compute_deflections(
+            replace_measured_columns(exact, wrench=0.0 * measured_rows.wrench)
+        )
         is None
     )
     assert (
@@ -338,8 +348,8 @@ def test_nothing_is_said_without_differing_loads_or_known_compliances_or_with_to
         )
         is None
     )
-    assert compute_deflections(selected(exact, seen.pose < 3)) is None
-    assert compute_deflections(selected(exact, seen.pose < 4)) is not None
+    assert compute_deflections(selected(exact, measured_rows.pose < 3)) is None
+    assert compute_deflections(selected(exact, measured_rows.pose < 4)) is not None
 
 
 def made_deflections(sign=1.0, force=1.0, moment=1.0, ratios=1.0, noise=1e-2):
@@ -347,16 +357,18 @@ def made_deflections(sign=1.0, force=1.0, moment=1.0, ratios=1.0, noise=1e-2):
     unit make them seen."""
     rng = np.random.default_rng(1)
     by_force, by_moment = 1e-3 * rng.standard_normal((2, 450, JOINTS))
-    seen = sign * (force * by_force + moment * by_moment) @ (ratios * np.ones(JOINTS))
-    seen = seen + noise * np.abs(seen).max() * rng.standard_normal(450)
-    return seen, np.stack([by_force.sum(axis=1), by_moment.sum(axis=1)], axis=1)
+    measured = (
+        sign * (force * by_force + moment * by_moment) @ (ratios * np.ones(JOINTS))
+    )
+    measured = measured + noise * np.abs(measured).max() * rng.standard_normal(450)
+    return measured, np.stack([by_force.sum(axis=1), by_moment.sum(axis=1)], axis=1)
 
 
 KILOGRAM = 9.80665
 POUND = 4.4482216152605
 
 
-def told(faults):
+def decode_load_faults(faults):
     """Sign, newtons and newton metres for each unit, and the words of each fault, of
     what is found."""
     unit = [
@@ -371,15 +383,13 @@ def told(faults):
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize(("force", "moment", "words"), LOAD_UNITS)
-def test_every_unit_and_sign_is_found_by_what_it_makes_of_the_deflections(
-    sign, force, moment, words
-):
-    seen, expected = made_deflections(sign, force, moment)
-    found = find_wrong_loads(seen, expected)
-    assert bool(found) == (sign < 0 or bool(words))
-    assert told(found) == pytest.approx((sign, force, moment))
-    for fault in found:
+@pytest.mark.parametrize(("force", "moment", "phrase"), LOAD_UNITS)
+def test_every_unit_and_sign_is_found_from_the_deflections(sign, force, moment, phrase):
+    measured, expected = made_deflections(sign, force, moment)
+    reported = find_wrong_loads(measured, expected)
+    assert bool(reported) == (sign < 0 or bool(phrase))
+    assert decode_load_faults(reported) == pytest.approx((sign, force, moment))
+    for fault in reported:
         # Forces and moments deflect alike here, so that the slope is the mean of their
         # factors.
         slope = sign * (force + moment) / 2
@@ -387,9 +397,11 @@ def test_every_unit_and_sign_is_found_by_what_it_makes_of_the_deflections(
             slope, rel=0.01 if force == moment else 0.1
         )
         # Of what robots have in common, 1/1.7 to 1.7, the factor that leaves least.
-        left = seen - np.linspace(1 / 1.7, 1.7, 2001)[:, None] * expected.sum(axis=1)
+        residual = measured - np.linspace(1 / 1.7, 1.7, 2001)[:, None] * expected.sum(
+            axis=1
+        )
         assert fault.evidence[0] == pytest.approx(
-            np.sqrt((left**2).mean(axis=1)).min(), rel=0.02
+            np.sqrt((residual**2).mean(axis=1)).min(), rel=0.02
         )
         assert fault.evidence[1] < 0.1 * fault.evidence[0]
 
@@ -410,15 +422,15 @@ def test_no_unit_is_found_for_compliances_that_are_only_off(ratios):
     assert find_wrong_loads(*made_deflections(ratios=ratios)) == []
 
 
-def test_of_two_units_within_reach_the_one_by_which_compliances_are_nearest_nominal_is_named_first():
+def test_of_equivalent_units_the_one_with_compliances_closest_to_nominal_is_named_first():
     # 1.4 times pounds-force are 0.63 times kilogram-force, and 1.55 times 0.70.
     (fault,) = find_wrong_loads(
         *made_deflections(force=POUND, moment=POUND, ratios=1.4)
     )
     assert fault.detail.startswith("the loads look like pounds-force")
     assert [
-        each.startswith("the loads look like kilogram-force")
-        for each in fault.alternatives
+        alternative.startswith("the loads look like kilogram-force")
+        for alternative in fault.alternatives
     ] == [True]
     (fault,) = find_wrong_loads(
         *made_deflections(force=POUND, moment=POUND, ratios=1.55)

@@ -48,9 +48,11 @@ def test_a_joint_counted_the_other_way_round_is_named(fanuc, joint, tracker):
 
 
 def test_loads_that_are_numbered_throughout_have_no_row_beside_them(campaign):
-    seen = campaign.measurements
+    measured_rows = campaign.measurements
     turned = replace_measured_columns(
-        campaign, joint_angles=-seen.joint_angles, load=np.arange(len(seen)) + 1
+        campaign,
+        joint_angles=-measured_rows.joint_angles,
+        load=np.arange(len(measured_rows)) + 1,
     )
     assert not [
         fault
@@ -60,11 +62,11 @@ def test_loads_that_are_numbered_throughout_have_no_row_beside_them(campaign):
 
 
 @pytest.mark.parametrize(
-    ("joint", "sign", "words"),
+    ("joint", "sign", "phrase"),
     [(2, 1.0, "taken from"), (2, -1.0, "added to"), (5, -1.0, "added to")],
 )
 def test_a_joint_counted_from_its_neighbour_is_named_with_it(
-    campaign, joint, sign, words
+    campaign, joint, sign, phrase
 ):
     angles = campaign.measurements.joint_angles.copy()
     angles[:, joint] += sign * angles[:, joint - 1]
@@ -72,7 +74,7 @@ def test_a_joint_counted_from_its_neighbour_is_named_with_it(
         replace_measured_columns(campaign, joint_angles=angles)
     )
     assert fault.joints == (joint, joint + 1)
-    assert words in fault.detail
+    assert phrase in fault.detail
 
 
 def test_the_sign_is_that_of_the_column_of_the_file(fanuc):
@@ -111,13 +113,15 @@ ELSEWHERE = Rotation.from_rotvec([0.3, -0.5, 1.2]), np.array([2.0, 0.6, -0.2])
 
 def with_turned_mount(campaign, turn, moved_m=0.0):
     """Of the last target, which is also moved along its z axis."""
-    mine = campaign.measurements.target[:, None] == 3
+    is_last_target = campaign.measurements.target[:, None] == 3
     measured = Rotation.from_rotvec(campaign.measurements.rotation_vector)
-    place = np.where(mine, measured.apply([0.0, 0.0, moved_m]), 0.0)
-    vectors = np.where(mine, (measured * turn).as_rotvec(), measured.as_rotvec())
+    displacement = np.where(is_last_target, measured.apply([0.0, 0.0, moved_m]), 0.0)
+    vectors = np.where(
+        is_last_target, (measured * turn).as_rotvec(), measured.as_rotvec()
+    )
     return replace_measured_columns(
         campaign,
-        position=campaign.measurements.position + place,
+        position=campaign.measurements.position + displacement,
         rotation_vector=vectors,
     )
 
@@ -129,14 +133,14 @@ EXCHANGED = {
 }
 
 
-@pytest.mark.parametrize("words", EXCHANGED)
-def test_exchanged_axes_of_positions_are_named(campaign, words):
-    written = campaign.measurements.position @ np.array(EXCHANGED[words], float).T
+@pytest.mark.parametrize("phrase", EXCHANGED)
+def test_exchanged_axes_of_positions_are_named(campaign, phrase):
+    written = campaign.measurements.position @ np.array(EXCHANGED[phrase], float).T
     (fault,) = find_better_interpretation(
         replace_measured_columns(campaign, position=written)
     )
     assert fault.name == "swapped_axes"
-    assert fault.detail.endswith(f"measurements fit with {words}")
+    assert fault.detail.endswith(f"measurements fit with {phrase}")
 
 
 @pytest.mark.parametrize(("factor", "unit"), [(1000, "millimetres"), (0.1, "tenth")])
@@ -151,10 +155,10 @@ def test_positions_in_another_unit_are_named(campaign, factor, unit):
 
 
 @pytest.mark.parametrize(
-    ("letters", "words"), [("XYZ", "moved x, y, z"), ("xyz", "roll, pitch, yaw")]
+    ("letters", "phrase"), [("XYZ", "moved x, y, z"), ("xyz", "roll, pitch, yaw")]
 )
 def test_angles_in_the_columns_of_the_rotation_vector_are_named(
-    campaign, letters, words
+    campaign, letters, phrase
 ):
     angles = Rotation.from_rotvec(campaign.measurements.rotation_vector).as_euler(
         letters
@@ -162,7 +166,7 @@ def test_angles_in_the_columns_of_the_rotation_vector_are_named(
     (fault,) = find_better_interpretation(
         replace_measured_columns(campaign, rotation_vector=angles)
     )
-    assert words in fault.detail
+    assert phrase in fault.detail
 
 
 def test_each_session_has_a_transform_of_its_own(fanuc):
@@ -216,22 +220,22 @@ def known_targets(fanuc, factor=1.0, which=slice(None)):
         replace(t, offset_m=tuple(o))
         for t, o in zip(plain.targets, written, strict=True)
     )
-    seen = replace(
+    measured_rows = replace(
         plain.measurements,
         position=position + 6e-5 * rng.standard_normal(position.shape),
     )
-    return replace(plain, targets=targets, measurements=seen)
+    return replace(plain, targets=targets, measurements=measured_rows)
 
 
 @pytest.mark.parametrize(
-    ("which", "words"),
+    ("which", "phrase"),
     [(slice(None), "T2DoF, T3DoF, T4DoF, T6DoF"), (slice(3, 4), "T6DoF")],
 )
-def test_target_offsets_in_millimetres_are_named(fanuc, which, words):
+def test_target_offsets_in_millimetres_are_named(fanuc, which, phrase):
     campaign = known_targets(fanuc, 1000.0, which)
     (fault,) = find_better_interpretation(campaign)
     assert fault.name == "wrong_unit" and fault.detail.startswith(
-        f"the target offset of {words} looks like millimetres"
+        f"the target offset of {phrase} looks like millimetres"
     )
 
 
@@ -274,23 +278,23 @@ def test_a_base_that_stands_a_little_off_is_left_to_physics(fanuc, shift, names)
     assert [fault.name for fault in find_better_interpretation(moved)] == names
 
 
-def test_what_fits_as_well_is_listed_as_an_alternative(fanuc):
+def test_an_equivalent_hypothesis_is_listed_as_an_alternative(fanuc):
     """In a frame that nobody knows, axes and rotation vectors exchanged together are
     mirrored in one way or another."""
     campaign = make_campaign(fanuc, 1, Plan(poses=14, tracker=True))
-    seen = campaign.measurements
+    measured_rows = campaign.measurements
     exchanged = {
-        name: getattr(seen, name)[:, [1, 0, 2]]
+        name: getattr(measured_rows, name)[:, [1, 0, 2]]
         for name in ("position", "rotation_vector")
     }
     (fault,) = find_better_interpretation(
         replace_measured_columns(campaign, **exchanged)
     )
     assert fault.name == "swapped_axes" and len(fault.alternatives) >= 3
-    assert all("rotation vectors likewise" in words for words in fault.alternatives)
+    assert all("rotation vectors likewise" in phrase for phrase in fault.alternatives)
 
 
-def test_measurements_of_nothing_are_mended_by_nothing(campaign):
+def test_random_measurements_have_no_better_interpretation(campaign):
     rng = np.random.default_rng(5)
     assert (
         find_better_interpretation(
@@ -323,7 +327,7 @@ def test_a_robot_that_hardly_moves_is_not_fitted_by_gathering_measurements_in_on
 
 
 @pytest.mark.parametrize(("degrees", "moved_m"), [(8, 0.0), (180, 0.05)])
-def test_a_mount_that_is_turned_otherwise_is_named_with_the_remedy_and_fitted_only_where_that_is_stated(
+def test_a_rotated_mount_is_named_with_its_remedy_and_fitted_only_if_declared_unknown(
     fanuc, degrees, moved_m
 ):
     campaign = make_campaign(fanuc, 1, Plan(poses=14))
@@ -349,19 +353,19 @@ def test_a_mount_that_is_turned_otherwise_is_named_with_the_remedy_and_fitted_on
             )
 
 
-def test_what_is_simple_comes_first_and_no_each_is_there_twice(fanuc):
+def test_simple_hypotheses_come_first_and_none_is_listed_twice(fanuc):
     campaign = make_campaign(fanuc, 1, Plan(poses=10))
     single = [*list_discrete_hypotheses(campaign), *list_row_shifts(campaign)]
     assert single[0].joints == (1,)
-    details = [each.detail for each in single]
+    details = [hypothesis.detail for hypothesis in single]
     assert len(set(details)) == len(details)
-    assert [each.detail for each in list_fitted_hypotheses(campaign)] == [
+    assert [hypothesis.detail for hypothesis in list_fitted_hypotheses(campaign)] == [
         "the base stands elsewhere",
         "targets are turned otherwise",
         "targets sit elsewhere",
     ]
-    for each in single:
-        read = each.apply(campaign)
+    for hypothesis in single:
+        read = hypothesis.apply(campaign)
         assert read is not campaign and len(read.measurements) <= len(
             campaign.measurements
         )

@@ -24,11 +24,13 @@ def exact(request, fanuc):
     return make_campaign(fanuc, 1, replace(EXACT, tracker=request.param == "tracker"))
 
 
-@pytest.mark.parametrize("place", [place_measurements, place_robustly])
-def test_measurements_of_the_nominal_robot_lie_where_it_puts_them(exact, place):
-    found = place(exact)
-    np.testing.assert_allclose(found.distance, 0.0, atol=1e-8)
-    np.testing.assert_allclose(found.rotation_angle, 0.0, atol=1e-7)
+@pytest.mark.parametrize("position_in_input", [place_measurements, place_robustly])
+def test_measurements_of_the_nominal_robot_lie_where_it_puts_them(
+    exact, position_in_input
+):
+    result = position_in_input(exact)
+    np.testing.assert_allclose(result.distance, 0.0, atol=1e-8)
+    np.testing.assert_allclose(result.rotation_angle, 0.0, atol=1e-7)
 
 
 def test_known_targets_are_predicted_by_pinocchio(fanuc):
@@ -37,26 +39,26 @@ def test_known_targets_are_predicted_by_pinocchio(fanuc):
         replace(target, offset_m=(0.1, -0.2, 0.05 * k))
         for k, target in enumerate(campaign.targets)
     )
-    campaign, seen = replace(campaign, targets=moved), campaign.measurements
-    found = place_measurements(campaign)
-    for row in range(0, len(seen), 7):
-        target = moved[seen.target[row]]
+    campaign, rows = replace(campaign, targets=moved), campaign.measurements
+    result = place_measurements(campaign)
+    for row in range(0, len(rows), 7):
+        target = moved[rows.target[row]]
         point = PinocchioPoint(
             fanuc.chain,
             replace(fanuc.chain.point(target.point), offset_m=target.offset_m),
         )
-        position, rotation, _ = point.pose_and_jacobian(seen.joint_angles[row])
-        np.testing.assert_allclose(found.predicted[row], position, rtol=0, atol=1e-12)
+        position, rotation, _ = point.pose_and_jacobian(rows.joint_angles[row])
+        np.testing.assert_allclose(result.predicted[row], position, rtol=0, atol=1e-12)
         turn = (
-            Rotation.from_rotvec(seen.rotation_vector[row])
+            Rotation.from_rotvec(rows.rotation_vector[row])
             * Rotation.from_matrix(rotation).inv()
         )
-        assert found.rotation_angle[row] == pytest.approx(turn.magnitude(), abs=1e-9)
+        assert result.rotation_angle[row] == pytest.approx(turn.magnitude(), abs=1e-9)
         # In the base frame measured positions stay as they are.
-        np.testing.assert_array_equal(found.measured[0][row], seen.position[row])
+        np.testing.assert_array_equal(result.measured[0][row], rows.position[row])
 
 
-def test_one_measurement_in_four_far_off_moves_the_robust_fit_by_nothing_and_the_other_one_by_much(
+def test_outliers_among_a_quarter_of_the_rows_do_not_move_the_robust_fit(
     fanuc,
 ):
     campaign = make_campaign(fanuc, 1, replace(EXACT, tracker=True, poses=16))
@@ -71,7 +73,7 @@ def test_one_measurement_in_four_far_off_moves_the_robust_fit_by_nothing_and_the
     assert place_measurements(campaign).distance[~far].min() > 0.01
 
 
-def test_the_robust_fit_of_normal_errors_is_the_fit_to_all_and_single_rows_are_no_misfit(
+def test_normal_errors_have_the_same_robust_fit_and_single_rows_are_no_misfit(
     fanuc,
 ):
     campaign = make_campaign(fanuc, 1, Plan(poses=12, loads=0, tracker=True))
@@ -80,10 +82,12 @@ def test_the_robust_fit_of_normal_errors_is_the_fit_to_all_and_single_rows_are_n
         place_measurements(campaign).estimate.frame_position,
     )
     exact = make_campaign(fanuc, 1, EXACT)
-    one = np.where(exact.measurements.pose[:, None] == 3, 0.3, 0.0)
+    outlier = np.where(exact.measurements.pose[:, None] == 3, 0.3, 0.0)
     assert (
         place_measurements(
-            replace_measured_columns(exact, position=exact.measurements.position + one)
+            replace_measured_columns(
+                exact, position=exact.measurements.position + outlier
+            )
         ).misfit.max()
         < 1e-6
     )
@@ -96,14 +100,16 @@ def test_poses_are_spread_over_the_campaign_at_their_lowest_load_and_first_repea
     fanuc, wanted, poses
 ):
     campaign = make_campaign(fanuc, 1, Plan(poses=12, loads=2, repeats=2))
-    some = campaign.measurements.select(campaign.measurements.load > 0)
-    order = np.random.default_rng(5).permutation(len(some))
-    found = select_spread_poses(
-        replace(campaign, measurements=some.select(order)), wanted
+    loaded = campaign.measurements.select(campaign.measurements.load > 0)
+    order = np.random.default_rng(5).permutation(len(loaded))
+    result = select_spread_poses(
+        replace(campaign, measurements=loaded.select(order)), wanted
     ).measurements
     for target in range(len(POINTS)):
-        assert sorted(found.pose[found.target == target].tolist()) == poses
-    assert (found.load == 1).all() and (found.repeat == 0).all()
+        assert sorted(result.pose[result.target == target].tolist()) == poses
+    assert (result.load == 1).all() and (result.repeat == 0).all()
     # In the order in which they were given.
-    place = [np.flatnonzero(some.row[order] == row)[0] for row in found.row]
-    assert (np.diff(place) > 0).all()
+    position_in_input = [
+        np.flatnonzero(loaded.row[order] == row)[0] for row in result.row
+    ]
+    assert (np.diff(position_in_input) > 0).all()

@@ -131,7 +131,6 @@ def test_averages_are_those_of_each_session_pose_load_side_and_target_by_hand(se
     states = observations.states
     rows_of_states = group_by_state_and_target(measurements)
     poses = sorted({state[:2] for state in rows_of_states})
-    averages = 0
     for index, state in enumerate(sorted(rows_of_states)):
         rows_of_targets = rows_of_states[state]
         pose_index = poses.index(state[:2])
@@ -144,9 +143,8 @@ def test_averages_are_those_of_each_session_pose_load_side_and_target_by_hand(se
             )
             assert observations.cluster[observation] == pose_index
             assert_is_mean(observations, observation, measurements, rows)
-            averages += 1
     assert len(states) == len(rows_of_states)
-    assert len(observations) == averages
+    assert len(observations) == sum(map(len, rows_of_states.values()))
     in_order = average_repeats(measurements.select(np.argsort(measurements.row)))
     for name, value in vars(states).items():
         np.testing.assert_allclose(

@@ -91,13 +91,15 @@ def make_run(folder):
     states, deflections, noise, estimates = (
         np.concatenate(arrays) for arrays in zip(*data_sets, strict=True)
     )
-    numbers = np.arange(DATA_SETS).repeat(CONFIGURATIONS)
-    configurations = np.tile(np.arange(CONFIGURATIONS), DATA_SETS)
-    keys = pd.DataFrame({"data_set": numbers, "configuration": configurations})
-    names = ["q1", "q2", *WRENCH]
+    keys = pd.DataFrame(
+        {
+            "data_set": np.arange(DATA_SETS).repeat(CONFIGURATIONS),
+            "configuration": np.tile(np.arange(CONFIGURATIONS), DATA_SETS),
+        }
+    )
     data = folder / "data/simulated/two"
     (data / "100um").mkdir(parents=True)
-    keys.join(pd.DataFrame(states, columns=names)).to_parquet(
+    keys.join(pd.DataFrame(states, columns=["q1", "q2", *WRENCH])).to_parquet(
         data / "experiments.parquet"
     )
     for name, values in (
@@ -108,7 +110,7 @@ def make_run(folder):
         keys.assign(point=POINT, **columns).to_parquet(data / f"{name}.parquet")
     results = folder / "results/identified/two/100um"
     results.mkdir(parents=True)
-    lengths = keys[["data_set"]].assign(length=configurations + 1)
+    lengths = keys[["data_set"]].assign(length=keys["configuration"] + 1)
     compliances = ["compliance_1", "compliance_2"]
     lengths.join(pd.DataFrame(estimates, columns=compliances)).to_parquet(
         results / f"{POINT}.parquet"

@@ -33,7 +33,7 @@ segments = st.lists(
     ),
     min_size=2,
     max_size=7,
-).filter(lambda parts: any(part[0] != "fixed" for part in parts))
+).filter(lambda chain: any(segment[0] != "fixed" for segment in chain))
 
 
 def numbers(values):

@@ -206,17 +206,16 @@ def make_measurements(
 ):
     """Simulate repeats of poses in base axes: the joints come to rest anew at each
     approach, and each measurement has its own sensor noise."""
-    joints = model.sites.joints
     targets = len(model.targets)
     pose = np.repeat(np.arange(poses_count), repeats * targets)
     repeat = np.tile(np.repeat(np.arange(repeats), targets), poses_count)
     target = np.tile(np.arange(targets), poses_count * repeats)
-    commanded = rng.uniform(-1.2, 1.2, (poses_count, joints))[pose]
-    rest = (joint_rad * rng.standard_normal((poses_count * repeats, joints))).repeat(
-        targets, axis=0
-    )
+    commanded = rng.uniform(-1.2, 1.2, (poses_count, model.sites.joints))[pose]
+    rest_error = (
+        joint_rad * rng.standard_normal((poses_count * repeats, model.sites.joints))
+    ).repeat(targets, axis=0)
     coordinates = np.zeros((len(pose), model.sites.chain.coordinates))
-    coordinates[:, :joints] = commanded + rest
+    coordinates[:, : model.sites.joints] = commanded + rest_error
     position = np.empty((len(pose), 3))
     rotation = np.empty((len(pose), 3, 3))
     for index, mounted in enumerate(model.targets):
@@ -228,14 +227,16 @@ def make_measurements(
             model.sites.chain, coordinates[mask], point
         )
     noise = Rotation.from_rotvec(sensor_rad * rng.standard_normal((len(pose), 3)))
-    measured_rotation = noise * Rotation.from_matrix(rotation)
+    rotation_vector = None
+    if model.rows == 6:
+        rotation_vector = (noise * Rotation.from_matrix(rotation)).as_rotvec()
     return fill_measurements(
         pose=pose,
         repeat=repeat,
         target=target,
         joint_angles=commanded,
         position=position + sensor_m * rng.standard_normal(position.shape),
-        rotation_vector=measured_rotation.as_rotvec() if model.rows == 6 else None,
+        rotation_vector=rotation_vector,
     )
 
 

@@ -101,9 +101,9 @@ CARRIED = {
 def test_carried_links_are_those_whose_weight_can_turn_the_joint(name, chain_called):
     sites = build_sites(robot_on(chain_called(name)))
     lengths = np.linalg.norm(sites.link_vectors_m, axis=1)
-    expected = [
-        [link for link in links if lengths[link] > 0] for links in CARRIED[name]
-    ]
+    expected = []
+    for links in CARRIED[name]:
+        expected.append([link for link in links if lengths[link] > 0])
     assert [sites.carried_links(joint) for joint in range(sites.joints)] == expected
     # The shoulder is the first joint that carries weight.
     assert sites.shoulder == next(

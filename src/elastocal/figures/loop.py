@@ -339,13 +339,7 @@ def draw_before_after(
         if noise_floor_m:
             axis.axvline(factor * noise_floor_m, gid="noise floor", **_NOISE_STYLE)
         axis.set(title=title, xlabel=f"error ({unit})")
-        if logarithmic_range is None:
-            axis.set_xlim(0, None)
-        else:
-            smallest, largest = logarithmic_range
-            axis.set_xscale("log")
-            axis.set_xlim(0.5 * factor * smallest, 1.6 * factor * largest)
-            axis.xaxis.set_major_formatter("{x:g}")
+        _scale_error_axis(axis, logarithmic_range, factor)
         axis.grid(visible=False, axis="y")
         axis.set_axisbelow(True)
     axes[0, 0].set(yticks=rows, ylim=(heights.sum(), 0))
@@ -356,6 +350,19 @@ def draw_before_after(
         handles.append(Line2D([], [], label=label, **_NOISE_STYLE))
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
+
+
+def _scale_error_axis(
+    axis: Axes, logarithmic_range: tuple[float, float] | None, factor: float
+) -> None:
+    """Scale an axis of errors; `factor` converts m to the unit of the axis."""
+    if logarithmic_range is None:
+        axis.set_xlim(0, None)
+        return
+    smallest, largest = logarithmic_range
+    axis.set_xscale("log")
+    axis.set_xlim(0.5 * factor * smallest, 1.6 * factor * largest)
+    axis.xaxis.set_major_formatter("{x:g}")
 
 
 def _find_logarithmic_range(

@@ -269,8 +269,7 @@ def average_estimates(
         moments = moments + np.stack([scaled.sum(axis=0), (scaled**2).sum(axis=0)])
         averaged_quantity = _to_averaged_quantity(compliance, method)
         weighted_sum = weighted_sum + np.tensordot(weights, averaged_quantity, axes=1)
-    mean_quantity = weighted_sum / total_weight[:, None, None]
-    averaged = _to_averaged_quantity(mean_quantity, method)
+    averaged = _to_averaged_quantity(weighted_sum / total_weight[:, None, None], method)
     deviation = compute_mean_deviation(validation, averaged, test_weights)
     initial = test_weights @ validation.initial_errors / test_weights.sum(axis=1)
     mean, mean_square = moments / sets

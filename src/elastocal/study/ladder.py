@@ -259,8 +259,8 @@ def build_ladder(folds: list[NormalEquations], joints: int, links: int) -> Ladde
         Numbers of joints and links.
     """
     total = sum(folds[1:], start=folds[0])
-    sets, size = total.right_side.shape
-    elements = np.arange((size - joints) // links)
+    sets = len(total.right_side)
+    elements = np.arange((total.right_side.shape[1] - joints) // links)
     scaled = _ScaledEquations.from_products(total.gram, total.right_side)
     validation = _Folds.from_total(folds, total)
     rows = np.arange(sets)

@@ -245,8 +245,8 @@ def build_lengths_table(
                     for name, curve in bounds.items()
                 }
                 head = {"robot": robot, "points": points, "accuracy_um": accuracy}
-                measurements = needed["configurations"] * len(names)
-                rows.append({**head, **needed, "measurements": measurements})
+                needed["measurements"] = needed["configurations"] * len(names)
+                rows.append({**head, **needed})
     return make_frame(rows)
 
 
@@ -342,8 +342,9 @@ def build_break_even_table(
                     (reference_needed, counts[reference]),
                 )
                 interval = np.quantile(even[1:], [0.025, 0.975], method="nearest")
-                head = (robot, accuracy, points, reference)
-                rows.append((*head, *first, even[0], *interval))
+                rows.append(
+                    (robot, accuracy, points, reference, *first, even[0], *interval)
+                )
     columns = (
         "robot",
         "accuracy_um",

@@ -280,20 +280,19 @@ def compute_predictive_variances(
         gram += rows.T @ rows
     gram *= len(observations) / len(sample)
     root = np.linalg.inv(np.linalg.cholesky(gram + np.eye(count)))
-    cluster = sample.cluster
     fitted_variances = np.zeros(len(sample))
     for indices, plain, whitened in fitted.iterate_sensitivities(sample):
         fitted_variances[indices] = _variances_left_out(
             _apply_root(root, plain[:, :3] * (scale * counted)),
             _apply_root(root, whitened * scale),
-            cluster[indices],
+            sample.cluster[indices],
         )
-    variances = _variances_of_unseen(
+    unseen_variances = _variances_of_unseen(
         model, estimate, unseen, scale[counted], root[:, counted]
     )
     return (
-        _largest_by_group(fitted_variances, cluster),
-        _largest_by_group(variances, unseen.state),
+        _largest_by_group(fitted_variances, sample.cluster),
+        _largest_by_group(unseen_variances, unseen.state),
     )
 
 

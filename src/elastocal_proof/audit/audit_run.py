@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from importlib import resources
+from operator import attrgetter
 from typing import Any
 
 import pandas as pd
@@ -75,8 +76,8 @@ def find_checks(
 
 def tabulate_findings(findings: Iterable[Finding]) -> pd.DataFrame:
     """Tabulate findings as rows of audit.csv."""
-    rows = [[getattr(finding, name) for name in COLUMNS] for finding in findings]
-    return pd.DataFrame(rows, columns=[*COLUMNS])
+    rows = map(attrgetter(*COLUMNS), findings)
+    return pd.DataFrame(list(rows), columns=[*COLUMNS])
 
 
 def render_page(table: pd.DataFrame, facts: Mapping[str, str]) -> str:

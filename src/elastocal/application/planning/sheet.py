@@ -48,14 +48,17 @@ def build_sheet(survey: Survey, plan: Plan) -> pd.DataFrame:
             for load, share in enumerate(shares):
                 wrench_cells = _format_wrench(share, force)
                 for target in survey.targets:
-                    row: dict[str, Any] = {
-                        "pose": pose,
-                        "load": load,
-                        "repeat": repeat,
-                        "target": target.name,
-                        TICK_COLUMN: "",
-                    }
-                    rows.append(row | joint_cells | wrench_cells)
+                    rows.append(
+                        {
+                            "pose": pose,
+                            "load": load,
+                            "repeat": repeat,
+                            "target": target.name,
+                            TICK_COLUMN: "",
+                            **joint_cells,
+                            **wrench_cells,
+                        }
+                    )
     empty = ["x", "y", "z"]
     if survey.measured == "pose":
         empty += ["rx", "ry", "rz"]
