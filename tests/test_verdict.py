@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import jsonschema
 import pytest
 from made_loop_tables import CAMPAIGNS
 
@@ -10,17 +11,19 @@ from elastocal.errors import InputError
 from elastocal.io.json_files import read_json, write_json
 from elastocal.verdict import (
     NextExperiment,
+    build_verdict_schema,
     read_verdict,
     write_verdict,
 )
 
 
 @pytest.mark.parametrize("kind", CAMPAIGNS)
-def test_a_verdict_survives_its_file(kind, tmp_path):
+def test_a_verdict_survives_its_file_and_fits_the_schema(kind, tmp_path):
     path = tmp_path / "verdict.json"
     write_verdict(path, CAMPAIGNS[kind])
     assert read_verdict(path) == CAMPAIGNS[kind]
     document = json.loads(path.read_text(encoding="utf-8"))
+    jsonschema.validate(document, build_verdict_schema())
     assert "next_experiment" not in document
 
 

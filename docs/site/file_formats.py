@@ -3,6 +3,7 @@ writes, of the schemas of its tables."""
 
 from __future__ import annotations
 
+import json
 import re
 from importlib import import_module, resources
 from inspect import isfunction, signature
@@ -13,6 +14,7 @@ import yaml
 from jsonschema2md import Parser
 
 from elastocal.io.storage import TableSchema
+from elastocal.verdict import build_verdict_schema
 
 # Each document with where it stands.
 DOCUMENTS = {
@@ -58,13 +60,23 @@ def pages() -> dict[str, str]:
     documents = {
         f"{name}.md": _document(name, description)
         for name, description in DOCUMENTS.items()
-    } | {"tables.md": _tables()}
+    }
+    documents |= {"verdict.md": _verdict(), "tables.md": _tables()}
     return {
         "index.md": HEAD
         + "".join(f"{name.removesuffix('.md')}\n" for name in documents)
         + "```\n",
         **documents,
     }
+
+
+def _verdict() -> str:
+    """Write the schema of verdict.json, which follows from the dataclasses."""
+    schema = json.dumps(build_verdict_schema(), indent=2)
+    return (
+        "# verdict.json\n\nThe JSON schema of a verdict. `elastocal.verdict` has the"
+        f" classes.\n\n```json\n{schema}\n```\n"
+    )
 
 
 def _document(name: str, words: str) -> str:

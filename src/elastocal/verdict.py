@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.typed_json import (
     OMITTED_BY_DEFAULT,
+    build_json_schema,
     from_document,
     to_document,
 )
@@ -759,3 +760,8 @@ def read_verdict(path: str | Path) -> Verdict:
 def write_verdict(path: str | Path, verdict: Verdict) -> None:
     """Write verdict.json as an atomic write."""
     write_json(path, to_document(verdict), allow_nan=False)
+
+
+def build_verdict_schema() -> dict[str, Any]:
+    """Return the JSON schema of verdict.json."""
+    return build_json_schema(Verdict)

@@ -4,11 +4,13 @@ import json
 from dataclasses import dataclass, field
 from typing import Any
 
+import jsonschema
 import pytest
 
 from elastocal.errors import InputError
 from elastocal.io.typed_json import (
     OMITTED_BY_DEFAULT,
+    build_json_schema,
     from_document,
     to_document,
 )
@@ -51,6 +53,7 @@ def test_a_dataclass_survives_json(closed):
     document = json.loads(json.dumps(to_document(drawing)))
     assert ("closed" in document) == closed
     assert from_document(Drawing, document, "file") == drawing
+    jsonschema.validate(document, build_json_schema(Drawing))
 
 
 @pytest.mark.parametrize(
@@ -66,11 +69,13 @@ def test_a_dataclass_survives_json(closed):
         ({"colour": "red"}, "colour"),
     ],
 )
-def test_a_wrong_document_is_refused_by_key(changes, key):
+def test_a_wrong_document_is_refused_by_key_and_by_schema(changes, key):
     document = to_document(DRAWING) | changes
     with pytest.raises(InputError) as error:
         from_document(Drawing, document, "file")
     assert error.value.key.startswith(key) and error.value.source == "file"
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(document, build_json_schema(Drawing))
 
 
 def test_a_missing_key_is_named():

@@ -1,4 +1,4 @@
-"""Convert frozen dataclasses to JSON documents and back, with a check of every value.
+"""Convert frozen dataclasses to JSON documents and back, and derive their JSON schema.
 
 Supported field types are dataclasses, ``tuple[T, ...]``, tuples of fixed length,
 ``dict[str, T]``, unions, ``str``, ``bool``, ``int``, ``float``, ``None`` and ``Any``.
@@ -74,6 +74,17 @@ def from_document(
     """
     instance: Instance = _from_value(cls, document, source, "")
     return instance
+
+
+def build_json_schema(cls: type) -> dict[str, Any]:
+    """Return the JSON schema of a dataclass, with one definition for each class."""
+    definitions: dict[str, Any] = {}
+    reference = _schema_of(cls, definitions)
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **reference,
+        "$defs": definitions,
+    }
 
 
 def _is_omitted(entry: Field[Any], value: Any) -> bool:
@@ -209,3 +220,46 @@ def _name_type(member: Any) -> str:
     if is_dataclass(member):
         return str(getattr(member, "__name__", member))
     return "a list" if get_origin(member) is tuple else "a mapping"
+
+
+def _schema_of(expected: Any, definitions: dict[str, Any]) -> dict[str, Any]:
+    """Return the schema of a type; classes are added to the definitions."""
+    if expected is Any:
+        return {}
+    if expected in _SCALARS:
+        return {"type": _SCALARS[expected][0]}
+    if is_dataclass(expected):
+        return _reference(expected, definitions)
+    arguments = get_args(expected)
+    if get_origin(expected) is dict:
+        entry = _schema_of(arguments[1], definitions)
+        return {"type": "object", "additionalProperties": entry}
+    if get_origin(expected) is tuple and arguments[-1] is Ellipsis:
+        return {"type": "array", "items": _schema_of(arguments[0], definitions)}
+    members = [_schema_of(argument, definitions) for argument in arguments]
+    if get_origin(expected) is tuple:
+        return {
+            "type": "array",
+            "prefixItems": members,
+            "minItems": len(members),
+            "maxItems": len(members),
+        }
+    return {"anyOf": members}
+
+
+def _reference(cls: Any, definitions: dict[str, Any]) -> dict[str, Any]:
+    if cls.__name__ not in definitions:
+        # Reserve the name first, so that a class may contain itself.
+        definitions[cls.__name__] = {}
+        hints = _resolve_hints(cls)
+        definitions[cls.__name__] |= {
+            "type": "object",
+            "description": (cls.__doc__ or "").strip().split("\n\n")[0],
+            "properties": {
+                entry.name: _schema_of(hints[entry.name], definitions)
+                for entry in fields(cls)
+            },
+            "required": [entry.name for entry in fields(cls) if _is_required(entry)],
+            "additionalProperties": False,
+        }
+    return {"$ref": f"#/$defs/{cls.__name__}"}
