@@ -345,10 +345,10 @@ def _describe_import(imported: ImportedMeasurements) -> list[str]:
     options = imported.options
     columns = options.columns
     header = f"in line {options.header}" if options.header else "as stated"
-    readings = []
+    descriptions = []
     for name, column in columns.items():
         unit = f" in {options.units[name]}" if name in options.units else ""
-        readings.append(f"{name} from {column!r}{unit}")
+        descriptions.append(f"{name} from {column!r}{unit}")
     skipped = []
     if imported.skipped:
         skipped.append(f"{format_count(imported.skipped, 'row')} without a position")
@@ -366,7 +366,7 @@ def _describe_import(imported: ImportedMeasurements) -> list[str]:
         _describe_size(imported),
         f"file: names of columns {header}, separator {options.separator},"
         f" decimal {options.decimal}, encoding {options.encoding}",
-        f"read: {'; '.join(readings)}",
+        f"read: {'; '.join(descriptions)}",
         f"orientations: {options.rotation}",
     ]
     for title, names in lists.items():

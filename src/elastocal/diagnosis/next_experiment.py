@@ -433,13 +433,13 @@ class _Plan:
         within_reach = compute_resolution_probability(gains) >= 0.5
         separations = np.where(within_reach, separations, np.inf)
         alternatives = [h.mechanisms for h in hypotheses[1:]]
-        rivals = probabilities[1:][within_reach].sum()
+        weight_of_alternatives = probabilities[1:][within_reach].sum()
         return cls(
             chosen,
             separations.min(axis=1),
             alternatives[int(np.argmin(separations[-1]))],
             tuple(alternatives[n] for n in np.flatnonzero(~within_reach)),
-            float(probabilities[0] / (probabilities[0] + rivals)),
+            float(probabilities[0] / (probabilities[0] + weight_of_alternatives)),
         )
 
 

@@ -174,7 +174,10 @@ def _choose_member(
 
 
 def _fits(member: Any, value: Any) -> bool:
-    """Whether the outermost level of a value has a type: keys tell dataclasses apart."""
+    """Whether a value has a type on its outermost level.
+
+    Dataclasses are distinguished by their keys.
+    """
     if is_dataclass(member):
         if not isinstance(value, dict):
             return False

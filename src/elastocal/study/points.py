@@ -75,12 +75,12 @@ def evaluate_point_sets(
     joints = tuple(range(study.robot.joints))
     validation = study.make_validation_set()
     available = {point.name for point in study.robot.chain.points}
-    readings = {
+    measured_points = {
         label: _name_readings(points)
         for label, points in point_sets.items()
         if available.issuperset(points)
     }
-    names = dict.fromkeys(name for names in readings.values() for name in names)
+    names = dict.fromkeys(name for names in measured_points.values() for name in names)
     once = [name for name in names if not name.endswith(_AGAIN)]
     again = [name.removesuffix(_AGAIN) for name in names if name.endswith(_AGAIN)]
     for sets in study.list_blocks():
@@ -88,7 +88,7 @@ def evaluate_point_sets(
         if again:
             repeated = study.measure(sets, again, _AGAIN)
             measurements |= {name + _AGAIN: repeated[name] for name in again}
-        for label, points in readings.items():
+        for label, points in measured_points.items():
             strategy = Strategy("", (Stage(points, joints),))
             estimates = study.estimate(strategy, measurements)
             squares = validation.compute_mean_square(estimates)
@@ -100,7 +100,7 @@ def evaluate_point_sets(
 
 
 def _name_readings(points: Sequence[str]) -> tuple[str, ...]:
-    """Names of the readings of a set of points; repeated points get a suffix."""
+    """Names of the measurements of a set of points; repeated points get a suffix."""
     return tuple(
         name + _AGAIN if name in points[:position] else name
         for position, name in enumerate(points)

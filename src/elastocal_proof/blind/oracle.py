@@ -1,4 +1,4 @@
-"""Upper bounds of what a diagnosis can achieve: the oracle, which is told the effects,
+"""Upper bounds of what a diagnosis can achieve: the oracle, which knows the effects,
 and the best analyst, who knows the laws of the simulated robot.
 
 The oracle has the same data as the diagnosis and knows which effects of the catalogue

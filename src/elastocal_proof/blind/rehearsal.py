@@ -163,7 +163,7 @@ def misplace_base(robot: SimulatedRobot, seed: int) -> SimulatedRobot:
 def fill_sheet(
     path: Path, document: Mapping[str, Any], robot: SimulatedRobot, seed: int
 ) -> int:
-    """Fill the measurement sheet at `path` with the readings of a tracker.
+    """Fill the measurement sheet at `path` with the measurements of a tracker.
 
     Parameters
     ----------

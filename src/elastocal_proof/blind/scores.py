@@ -34,8 +34,8 @@ _MISPLACED_BASE = "base_placement"
 # leave next to nothing of it.
 _FORCE_SCALE = "force_scale"
 # Effects that lie within the span of another effect or of the joint compliances, by
-# effect and joints of the ground truth, with the mechanism that they cannot be told
-# from. Other aliases are resolved by a known frame, known targets and points at the
+# effect and joints of the ground truth, with the mechanism from which they are
+# not distinguishable. Other aliases are resolved by a known frame, known targets and points at the
 # elbow and the wrist: offset of joint 1 and base, last link and tool, tilt of joint 1
 # and base, coupling of joints 2 and 3 and upper arm.
 EXACT_ALIASES: dict[tuple[str, tuple[int, ...]], str] = {

@@ -1,4 +1,4 @@
-"""Campaigns of a simulated robot: what is done with it, the table of readings, and
+"""Campaigns of a simulated robot: what is done with it, the table of measurements, and
 rows that are wrong by a blunder."""
 
 from __future__ import annotations
@@ -187,11 +187,11 @@ def simulate_measurements(
     # State by state, because a tracker visits all targets of a state in turn.
     table = {name: np.repeat(column, len(points)) for name, column in columns.items()}
     table["target"] = np.tile(points, len(schedule.pose))
-    readings = np.concatenate([position, to_rotation_vector(rotation)], axis=2)
+    measurements = np.concatenate([position, to_rotation_vector(rotation)], axis=2)
     indices = [robot.arm.points.index(name) for name in points]
     measured = _POSE_COLUMNS if design.measured == "pose" else _POSE_COLUMNS[:3]
     table |= _name_columns(
-        measured, readings[:, indices, : len(measured)].reshape(-1, len(measured))
+        measured, measurements[:, indices, : len(measured)].reshape(-1, len(measured))
     )
     # Adding zero removes minus zeros: products with the zero load, which mean nothing.
     return {
@@ -239,9 +239,9 @@ def add_blunders(
         changed = _change_loads(wrong_table, robot, schedule, rows, sizes, draws)
     else:
         names = [name for name in _POSE_COLUMNS if name in table]
-        readings = np.array([table[name] for name in names])
-        _change_readings(readings, kind, rows, sizes, robot.tracker, draws)
-        wrong_table |= _name_columns(names, readings.T)
+        measurements = np.array([table[name] for name in names])
+        _spoil_measurements(measurements, kind, rows, sizes, robot.tracker, draws)
+        wrong_table |= _name_columns(names, measurements.T)
     return wrong_table, [{"kind": kind, "rows": group} for group in changed]
 
 
@@ -259,30 +259,30 @@ def _draw_rows(
     return sorted(shuffled[first_of_pose[:count]].tolist())
 
 
-def _change_readings(
-    readings: np.ndarray,
+def _spoil_measurements(
+    measurements: np.ndarray,
     kind: str,
     rows: list[int],
     sizes: np.ndarray,
     tracker: Tracker,
     draws: np.random.Generator,
 ) -> None:
-    """Make readings (columns, rows) of the tracker wrong in place."""
+    """Make measurements (columns, rows) of the tracker wrong in place."""
     if kind == "zeros":
-        readings[:, rows] = 0.0
+        measurements[:, rows] = 0.0
     elif kind == "held_point":
-        readings[:, rows] = readings[:, np.array(rows) - 1]
+        measurements[:, rows] = measurements[:, np.array(rows) - 1]
     elif kind == "swapped":
-        readings[:, rows] = readings[:, rows[::-1]]
+        measurements[:, rows] = measurements[:, rows[::-1]]
     elif kind == "position":
         for row, size in zip(rows, sizes, strict=True):
-            readings[:3, row] += size * tracker.sigma_m * draw_direction(draws)
+            measurements[:3, row] += size * tracker.sigma_m * draw_direction(draws)
     else:
         for row, size in zip(rows, sizes, strict=True):
             angle = min(size * tracker.sigma_rad, np.pi)
             turn = to_rotation_matrix(angle * draw_direction(draws))
-            rotation = turn @ to_rotation_matrix(readings[3:, row])
-            readings[3:, row] = to_rotation_vector(rotation)
+            rotation = turn @ to_rotation_matrix(measurements[3:, row])
+            measurements[3:, row] = to_rotation_vector(rotation)
 
 
 def _observe_rows(

@@ -596,7 +596,7 @@ def list_flexible_links(arm: Arm) -> list[tuple[int, ...]]:
 
 
 def find_distinguishable_weights(arm: Arm) -> dict[tuple[int, ...], int | None]:
-    """Find the weights that a campaign can tell apart by the joints that they load.
+    """Find the weights that a campaign can distinguish by the joints that they load.
 
     Returns the upper arm, the forearm, and None for all links together, by the joints,
     from 1, that each loads on an upright arm.
