@@ -76,7 +76,7 @@ def evaluate_point_sets(
     validation = study.make_validation_set()
     available = {point.name for point in study.robot.chain.points}
     measured_points = {
-        label: _name_readings(points)
+        label: _name_measurements(points)
         for label, points in point_sets.items()
         if available.issuperset(points)
     }
@@ -99,7 +99,7 @@ def evaluate_point_sets(
             }
 
 
-def _name_readings(points: Sequence[str]) -> tuple[str, ...]:
+def _name_measurements(points: Sequence[str]) -> tuple[str, ...]:
     """Names of the measurements of a set of points; repeated points get a suffix."""
     return tuple(
         name + _AGAIN if name in points[:position] else name

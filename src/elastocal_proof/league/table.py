@@ -265,8 +265,8 @@ def _describe_lead(table: pd.DataFrame, diagnosing: list[str]) -> str:
     for _, compared in table.groupby(["split", "data"]):
         diagnosed = compared["method"].isin(diagnosing).to_numpy()
         wins = bool(diagnosed[compared["rms_mm"].argmin()])
-        rival_ratios = compared["ratio_to_best_low"][diagnosed != wins]
-        lead_is_certain[wins].append(bool((rival_ratios > 1.0).all()))
+        alternative_ratios = compared["ratio_to_best_low"][diagnosed != wins]
+        lead_is_certain[wins].append(bool((alternative_ratios > 1.0).all()))
     won = lead_is_certain[True]
     lost = lead_is_certain[False]
     return (
