@@ -38,20 +38,22 @@ def names(requirements):
 
 
 def imported(paths):
-    """What is installed for each module that the files import, also within functions;
-    several packages may share a module."""
+    """Return the packages of each module that files import, also within functions.
+
+    Several packages may share a module.
+    """
     pattern = re.compile(r"^ *(?:from|import) (\w+)", re.MULTILINE)
-    packages = {
-        module
-        for path in paths
-        for module in pattern.findall(path.read_text(encoding="utf-8"))
-    }
-    by_module = (DISTRIBUTIONS.get(module) for module in packages)
-    return [
-        {name.lower().replace("_", "-") for name in packages}
-        for packages in by_module
-        if packages
-    ]
+    modules = set()
+    for path in paths:
+        modules.update(pattern.findall(path.read_text(encoding="utf-8")))
+    packages_by_module = []
+    for module in modules:
+        names = DISTRIBUTIONS.get(module)
+        if names:
+            packages_by_module.append(
+                {name.lower().replace("_", "-") for name in names}
+            )
+    return packages_by_module
 
 
 def test_what_every_user_installs_is_imported_by_what_every_user_runs():

@@ -111,34 +111,31 @@ def files_of(folder):
     }
 
 
+def package_files():
+    files = (name for name in files_of("src") if ".egg-info/" not in name)
+    return {name.removeprefix("src/") for name in files}
+
+
+def pipeline_files():
+    files = {"Snakefile", "config.yaml", "paper/paper.bib", "CITATION.cff"}
+    for folder in ("config", "data/measured", "profiles", "workflow"):
+        files.update(files_of(folder))
+    return {name for name in files if not name.startswith(LEFT_OUT)}
+
+
 @pytest.mark.slow
-def test_the_wheel_holds_every_file_of_the_package_and_of_its_pipeline_and_says_whose_it_is(
-    wheel,
-):
-    packages = {
-        name.removeprefix("src/")
-        for name in files_of("src")
-        if ".egg-info/" not in name
-    }
-    pipeline = {"Snakefile", "config.yaml", "paper/paper.bib", "CITATION.cff"}
-    pipeline |= {
-        name
-        for folder in ("config", "data/measured", "profiles", "workflow")
-        for name in files_of(folder)
-    }
-    pipeline = {name for name in pipeline if not name.startswith(LEFT_OUT)}
+def test_the_wheel_has_all_files_of_package_and_pipeline_and_states_its_licence(wheel):
     with zipfile.ZipFile(wheel) as archive:
         names = {name for name in archive.namelist() if not name.endswith("/")}
-        (stated,) = (name for name in names if name.endswith(".dist-info/METADATA"))
-        metadata = archive.read(stated).decode()
-    held = {
+        (path,) = (name for name in names if name.endswith(".dist-info/METADATA"))
+        metadata = archive.read(path).decode()
+    contents = {
         name.rpartition(".data/data/share/elastocal/")[2]
         for name in names
         if ".dist-info/" not in name
     }
-    assert held == packages | pipeline and any(
-        name.endswith(".dist-info/licenses/LICENSE") for name in names
-    )
+    assert contents == package_files() | pipeline_files()
+    assert any(name.endswith(".dist-info/licenses/LICENSE") for name in names)
     for line in (
         f"Version: {elastocal.__version__}",
         "Author: the elastocal developers",

@@ -24,18 +24,14 @@ IDENTIFIED, OF_STRATEGY = (
 
 def audited(folder):
     configuration = yaml.safe_load((folder / "config.yaml").read_text("utf-8"))
-    robots, strategies = (
-        {
-            name: yaml.safe_load(
-                (folder / f"config/{kind}/{name}.yaml").read_text("utf-8")
-            )
-            for name in configuration[kind]
-        }
-        for kind in ("robots", "strategies")
-    )
-    # Of so few data sets enough that what is planted in a whole column is in the
-    # sample.
-    return FinishedRun(folder, configuration, robots, strategies, 12)
+    documents = {"robots": {}, "strategies": {}}
+    for kind, by_name in documents.items():
+        for name in configuration[kind]:
+            path = folder / f"config/{kind}/{name}.yaml"
+            by_name[name] = yaml.safe_load(path.read_text("utf-8"))
+    # With so few data sets, a sample of 12 rows has an error that is planted in a whole
+    # column.
+    return FinishedRun(folder, configuration, *documents.values(), 12)
 
 
 @pytest.fixture(scope="module")

@@ -21,13 +21,13 @@ def rules(planned):
     return {job[0] for job in planned}
 
 
+def reads_sealed_file(files):
+    return any("sealed" in file for file in files if not file.startswith("src/"))
+
+
 def test_no_diagnosing_rule_has_a_sealed_file_among_its_inputs(small_proof):
     inputs = small_proof.inputs_by_rule(*BLIND)
-    readers = {
-        rule
-        for rule, files in inputs.items()
-        if any("sealed" in file for file in files if not file.startswith("src/"))
-    }
+    readers = {rule for rule, files in inputs.items() if reads_sealed_file(files)}
     assert readers == AFTERWARDS
     assert set(inputs) >= ANALYSIS and not readers & ANALYSIS
     # Nor anything that was made of one, but the manifest.
