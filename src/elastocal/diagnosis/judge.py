@@ -324,26 +324,27 @@ def compare_held_out_errors(
     by_range = summarize_errors_by_range(
         {"before": errors[declared], "after": errors[-1]}, outside
     )
-    after = _summarize(errors[-1])
     states = held_out.observations.states
-    joint_ranges = find_joint_ranges(states, held_out.campaign.robot)
     heldout = HeldOut(
         uncalibrated=UncalibratedErrors(
             **summarize_errors(errors[0].distance),
             reduction_ci95=(calibration.low, calibration.high),
         ),
         before=_summarize(errors[declared]),
-        after=after,
+        after=_summarize(errors[-1]),
         noise_floor_rms_m=None if np.isnan(floor) else floor,
         reduction_ci95=(reductions[-1].low, reductions[-1].high),
         reduction_std_error=reductions[-1].std_error,
         poses=errors[0].poses,
         configurations=count_configurations(states),
-        joint_ranges=tuple(JointRange(**limits) for limits in joint_ranges),
+        joint_ranges=tuple(
+            JointRange(**limits)
+            for limits in find_joint_ranges(states, held_out.campaign.robot)
+        ),
         share_below_max=bound_share_below_maximum(errors[0].poses),
         outside_range=from_document(ErrorsByRange, by_range, "errors by range"),
         with_gross_errors=None,
-        delivered=after,
+        delivered=_summarize(errors[-1]),
     )
     warnings = [
         *_warn_of_growth(heldout),
