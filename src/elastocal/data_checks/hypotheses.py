@@ -313,8 +313,13 @@ def list_row_shifts(campaign: Campaign) -> list[Hypothesis]:
             ("up", following, previous),
         ):
             detail = f"the measured columns fit one {kind} further {direction}"
-            shift = partial(_shift_measured, measurements, source, rows)
-            hypotheses.append(Hypothesis("shuffled_rows", detail, shift))
+            hypotheses.append(
+                Hypothesis(
+                    "shuffled_rows",
+                    detail,
+                    partial(_shift_measured, measurements, source, rows),
+                )
+            )
     return hypotheses
 
 

@@ -310,9 +310,9 @@ def _search_and_judge_rows(
         subset = fit_subset(case, ~outliers.gross | readmitted, settings, previous)
         if subset is previous:
             break
-        count = format_count((~subset.kept).sum(), "gross error")
         context.report(
-            f"{count} in {format_count(len(readmitted), 'row')}: once more without"
+            f"{format_count((~subset.kept).sum(), 'gross error')} in"
+            f" {format_count(len(readmitted), 'row')}: once more without"
         )
         refitted = fitted
         has_same_noise = serialize_noise(subset.noise) == serialize_noise(

@@ -215,7 +215,6 @@ def evaluate_extensions(
     (T,) of the model; (T, number of terms, S) of its extensions, not weighted by scale
     """
     model = _condition_on_model(statistics, base, scaled_columns)
-    degrees_of_freedom = statistics.degrees_of_freedom
     term_count = sum(len(block.numbers) for block in blocks)
     log_evidence = np.empty((len(base), term_count, len(grid.scales)))
     for block in blocks:
@@ -233,12 +232,12 @@ def evaluate_extensions(
         gains = ((by_axis**2)[..., None] * (variances / widened)).sum(axis=2)
         occam = -0.5 * np.log(widened).sum(axis=2)
         likelihood = log_likelihood(
-            model.squares[:, None, None] - gains, degrees_of_freedom
+            model.squares[:, None, None] - gains, statistics.degrees_of_freedom
         )
         log_evidence[:, block.numbers] = (
             model.log_occam[:, None, None] + occam + likelihood
         )
-    likelihood = log_likelihood(model.squares, degrees_of_freedom)
+    likelihood = log_likelihood(model.squares, statistics.degrees_of_freedom)
     return model.log_occam + likelihood, log_evidence
 
 

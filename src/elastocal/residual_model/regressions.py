@@ -270,6 +270,15 @@ def fit_ridge_harmonics(
         yield Predictor(mean)
 
 
+def _profile_likelihood(target: np.ndarray, solution: _RidgeSolution) -> float:
+    """Compute twice the log marginal likelihood of a solution, up to a constant.
+
+    The noise variance has its most probable value.
+    """
+    unexplained = max(target @ target - solution.explained_square, np.finfo(float).tiny)
+    return -len(target) * np.log(unexplained) - solution.log_determinant
+
+
 def fit_two_joints(
     inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int
 ) -> Iterator[Predictor]:
@@ -295,20 +304,16 @@ def fit_two_joints(
         projection = rows.T @ target
         for penalty in _PENALTIES * geometry.mean_square(gram):
             solution = geometry.solve_ridge(cross_gram, gram, projection, penalty)
-            unexplained = max(
-                target @ target - solution.explained_square, np.finfo(float).tiny
-            )
-            likelihood = -residual.size * np.log(unexplained) - solution.log_determinant
+            likelihood = _profile_likelihood(target, solution)
             if likelihood > largest_likelihood:
                 largest_likelihood = likelihood
                 best_pair = pair
                 coefficients = solution.coefficients
-    split = jacobian.shape[1]
 
     def mean(queries: Inputs) -> np.ndarray:
         columns = compute_pair_columns(queries, best_pair, joints)
-        geometric = queries.jacobian @ coefficients[:split]
-        return geometric + columns @ coefficients[split:]
+        geometric, by_pair = np.split(coefficients, [jacobian.shape[1]])
+        return queries.jacobian @ geometric + columns @ by_pair
 
     yield Predictor(mean)
 
@@ -456,10 +461,9 @@ def _fit_process(
     variance = hyperparameters.variance
     inputs = inputs / hyperparameters.lengths
     points = inputs[inducing]
-    identity = np.eye(len(points))
-    correlation = _evaluate_matern(points, points)[0] + _JITTER * identity
+    correlation = _evaluate_matern(points, points)[0] + _JITTER * np.eye(len(points))
     prior_factor = lapack.dpotrf(variance * correlation, lower=1)[0]
-    gram = hyperparameters.noise * identity
+    gram = hyperparameters.noise * np.eye(len(points))
     projection = np.zeros((len(points), 3))
     for chunk in _split_into_chunks(inputs):
         features = _compute_features(points, inputs[chunk], prior_factor, variance)

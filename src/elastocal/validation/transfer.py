@@ -259,17 +259,19 @@ def compute_predictive_variances(
     ----------
     .. [1] Cook and Weisberg 1982.
     """
-    parameters = fitted.parameters
-    count = len(parameters)
+    count = len(fitted.parameters)
     if not count:
         return (
             _largest_by_group(np.zeros(len(observations)), observations.cluster),
             _largest_by_group(np.zeros(len(unseen)), unseen.state),
         )
     scale = np.array(
-        [parameter.prior_std or parameter.plausible for _, parameter in parameters]
+        [
+            parameter.prior_std or parameter.plausible
+            for _, parameter in fitted.parameters
+        ]
     )
-    placement = find_placement_parameters(owner for owner, _ in parameters)
+    placement = find_placement_parameters(owner for owner, _ in fitted.parameters)
     counted = ~placement | _shares_placement(fitted, observations, model, unseen)
     sample = sample_observations(observations, _MAX_FITTED)
     if len(sample) < len(observations):

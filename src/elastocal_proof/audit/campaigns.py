@@ -90,13 +90,13 @@ def _draw_visits(
     for pose in range(poses):
         for load in range(len(plan["ladder"])):
             # The first poses are approached several times without and with full load.
-            repeated = pose < plan["repeated_poses"] and load < 2
-            repeats = plan["repeats"] if repeated else 1
-            visits += [(pose, load, repeat) for repeat in range(repeats)]
+            is_repeated = pose < plan["repeated_poses"] and load < 2
+            repeats = range(plan["repeats"] if is_repeated else 1)
+            visits += [(pose, load, repeat) for repeat in repeats]
     pose_index, load_index, _ = np.transpose(visits)
     force = np.array(plan["ladder"])[load_index, None] * forces[pose_index]
-    moment = np.cross(plan["offset_m"], force)
-    return visits, angles[pose_index], np.concatenate([force, moment], axis=1)
+    wrench = np.concatenate([force, np.cross(plan["offset_m"], force)], axis=1)
+    return visits, angles[pose_index], wrench
 
 
 def check_split(run: FinishedRun, file: str, campaign: str) -> Iterator[Finding]:

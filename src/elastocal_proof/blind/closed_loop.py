@@ -468,7 +468,6 @@ def compare_stated_accuracy(
         prediction = predict_errors(calibrated, angles[chosen], wanted.wrench[chosen])
         accuracy = prediction.summarize(part)
         distance = np.linalg.norm(errors[chosen], axis=1)
-        conformity = decide_conformity(prediction.rms_m, float(tolerance_m), _RISK)
         rows.append(
             {
                 "robot": robot_file.stem,
@@ -482,7 +481,9 @@ def compare_stated_accuracy(
                 "true_rms_m": float(np.sqrt((distance**2).mean())),
                 "true_worst_m": float(distance.max()),
                 "tolerance_m": float(tolerance_m),
-                "decision": conformity.decision,
+                "decision": decide_conformity(
+                    prediction.rms_m, float(tolerance_m), _RISK
+                ).decision,
             }
         )
     return rows

@@ -369,14 +369,15 @@ def draw_unit_signals(
                 signals.append(signal)
                 residuals.append(residual)
             lengths = np.linalg.norm(residuals, axis=1)
-            signal_squares = np.linalg.norm(signals, axis=1) ** 2
-            visible = np.flatnonzero(lengths**2 > _ABSORBED * signal_squares)
+            visible = np.flatnonzero(
+                lengths**2 > _ABSORBED * np.linalg.norm(signals, axis=1) ** 2
+            )
             if len(visible):
                 located.append(kind)
                 # Gears without a signal are those whose torque stays below the one at
                 # which they yield. The visible draws replace them.
-                chosen = np.resize(visible, _DRAWS)
-                units.append((np.array(residuals)[chosen] / lengths[chosen, None]).T)
+                visible = np.resize(visible, _DRAWS)
+                units.append((np.array(residuals)[visible] / lengths[visible, None]).T)
     return tuple(located), np.stack(units, axis=1)
 
 

@@ -313,7 +313,7 @@ def measure_errors(
         wrench = np.zeros((len(wanted), 6))
     errors = {}
     for model, suffix in (("uncorrected", "_uncorrected"), ("corrected", "")):
-        columns = [name + suffix for name in _name_angles(robot.arm.joints)]
+        columns = [f"{joint}{suffix}" for joint in _name_angles(robot.arm.joints)]
         require_numbers(table, columns, source)
         angles = table[columns].to_numpy(float)
         position, rotation = move_robot(robot, angles, wrench, seed, source)
@@ -407,8 +407,9 @@ def draw_milling_path(
         )
         position = centre + length_m * (share * ahead + share**2 * aside)
         rotation = np.broadcast_to(orientation, (count, 3, 3))
-        start = np.repeat(middle, count, axis=0)
-        angles, residual_m = solve_poses(robot, position, rotation, start)
+        angles, residual_m = solve_poses(
+            robot, position, rotation, np.repeat(middle, count, axis=0)
+        )
         if (
             residual_m.max() < SOLVED_M
             and not find_beyond_limits(robot, angles).any()
