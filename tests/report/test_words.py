@@ -36,7 +36,7 @@ def test_every_effect_of_the_catalogue_has_a_physical_name_and_a_kind():
         (
             "link_elasticity",
             ["links 1 and 2 and 6 one section"],
-            "of links 1, 2 and 6 (all links of one cross-section)",
+            "of links 1, 2 and 6 (one cross-section)",
         ),
         ("link_elasticity", ["column", "link 2"], "of the column and of link 2"),
         (

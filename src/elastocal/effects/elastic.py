@@ -105,7 +105,7 @@ def _bending_places(sites: Sites) -> list[tuple[tuple[int, ...], str]]:
     ),
     at=_bending_places,
     part="link",
-    detail_words={_ONE_SECTION: "all links of one cross-section"},
+    detail_words={_ONE_SECTION: "one cross-section"},
     formula=(
         r"y = \frac{F_y l^3 a}{E I} + \frac{M_z l^2 b}{E I}, \quad r_z = "
         r"\frac{F_y l^2 b}{E I} + \frac{M_z l c}{E I}, \quad r_x = \frac{M_x l "
