@@ -198,7 +198,7 @@ def _is_scalar(expected: Any, value: Any) -> bool:
 
 
 def _check(
-    is_valid: bool,  # noqa: FBT001
+    is_valid: bool,  # noqa: FBT001 - the outcome of the check before it
     value: Any,
     allowed: str,
     source: str | Path,
