@@ -718,11 +718,6 @@ class TrainingVerdict:
         """Faults of the data, after which a verdict says nothing of the robot."""
         return tuple(fault for fault in self.effects if isinstance(fault, DataFault))
 
-    @property
-    def residual_remains(self) -> bool:
-        """Whether a part of the residual is a function of the joints."""
-        return self.repeatable is not None and self.repeatable.remains
-
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict(TrainingVerdict):

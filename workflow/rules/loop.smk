@@ -163,11 +163,11 @@ rule draw_campaign_errors:
 rule measured_pictures:
     """The picture of docs/measured_data.md, from finished campaigns of measured data."""
     input:
-        picture="reports/loop/measured.png",
+        sources=["reports/loop/measured.png"],
     output:
-        picture="docs/measured_data.png",
-    shell:
-        "cp {input.picture} {output.picture} 2> {log}"
+        copies=["docs/measured_data.png"],
+    script:
+        "../scripts/copy_into_docs.py"
 
 
 rule diagnose:

@@ -293,9 +293,8 @@ def find_wrong_loads(measured: np.ndarray, expected: np.ndarray) -> list[Fault]:
         return []
     limit = _EQUIVALENT_RATIO * min(unit.residual_m for unit in candidates)
     equivalent = sorted(unit for unit in candidates if unit.residual_m <= limit)
-    return _report_wrong_loads(
-        equivalent, before, float(as_written @ measured / (as_written @ as_written))
-    )
+    slope = float(as_written @ measured / (as_written @ as_written))
+    return _report_wrong_loads(equivalent, before, slope)
 
 
 @dataclass(frozen=True, order=True)

@@ -324,6 +324,7 @@ def compare_held_out_errors(
     by_range = summarize_errors_by_range(
         {"before": errors[declared], "after": errors[-1]}, outside
     )
+    after = _summarize(errors[-1])
     states = held_out.observations.states
     heldout = HeldOut(
         uncalibrated=UncalibratedErrors(
@@ -331,7 +332,7 @@ def compare_held_out_errors(
             reduction_ci95=(calibration.low, calibration.high),
         ),
         before=_summarize(errors[declared]),
-        after=_summarize(errors[-1]),
+        after=after,
         noise_floor_rms_m=None if np.isnan(floor) else floor,
         reduction_ci95=(reductions[-1].low, reductions[-1].high),
         reduction_std_error=reductions[-1].std_error,
@@ -344,7 +345,7 @@ def compare_held_out_errors(
         share_below_max=bound_share_below_maximum(errors[0].poses),
         outside_range=from_document(ErrorsByRange, by_range, "errors by range"),
         with_gross_errors=None,
-        delivered=_summarize(errors[-1]),
+        delivered=after,
     )
     warnings = [
         *_warn_of_growth(heldout),

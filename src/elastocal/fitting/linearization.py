@@ -324,19 +324,13 @@ def linearize_coordinates(
     sites = model.sites
     points = locate_targets(model, estimate)
     moved = compute_motion(sites.chain, coordinates, (*sites.tracked_points, *points))
-    # Each fitted component of a target is an additional coordinate.
-    target_coordinates = sum(
-        components.stop - components.start
-        for _, components in model.fitted_target_components
-    )
     count = len(observations)
     position = np.empty((count, 3))
     rotation = np.empty((count, 3, 3))
     # The component comes first, so that the arithmetic of effects is contiguous along
     # the observations.
-    jacobian = np.zeros(
-        (model.rows, sites.chain.coordinates + target_coordinates, count)
-    )
+    coordinate_count = sites.chain.coordinates + _count_target_coordinates(model)
+    jacobian = np.zeros((model.rows, coordinate_count, count))
     for index, point in enumerate(points):
         members = np.flatnonzero(observations.target == index)
         state = observations.state[members]
@@ -362,6 +356,14 @@ def linearize_coordinates(
         columns,
         coordinates,
         replace_motion(conditions, moved),
+    )
+
+
+def _count_target_coordinates(model: Model) -> int:
+    """Count the fitted components of targets; each is an additional coordinate."""
+    return sum(
+        components.stop - components.start
+        for _, components in model.fitted_target_components
     )
 
 

@@ -318,15 +318,7 @@ def split_into_blocks(observations: Observations, columns: int) -> list[Block]:
     if width * count <= _MAX_SENSITIVITIES:
         return [Block(slice(0, states), slice(0, count), observations)]
     block_size = max(min(_MAX_SENSITIVITIES // width, _MAX_BLOCK_SIZE), 1)
-    pose_start = np.flatnonzero(np.diff(index_poses(observations.states), prepend=-1))
-    observation_start = np.searchsorted(observations.state, pose_start)
-    first_pose = np.unique(
-        np.searchsorted(observation_start, np.arange(0, count, block_size)).clip(
-            max=len(pose_start) - 1
-        )
-    )
-    state_edges = [*pose_start[first_pose].tolist(), states]
-    edges = [*observation_start[first_pose].tolist(), count]
+    state_edges, edges = _find_block_edges(observations, block_size)
     number = np.arange(states)
     blocks = []
     for (begin, end), (first, last) in zip(
@@ -337,6 +329,27 @@ def split_into_blocks(observations: Observations, columns: int) -> list[Block]:
         part = _select(observations, states_of_block, indices, number - begin)
         blocks.append(Block(states_of_block, indices, part))
     return blocks
+
+
+def _find_block_edges(
+    observations: Observations, block_size: int
+) -> tuple[list[int], list[int]]:
+    """Find where blocks of about `block_size` observations begin and end, at whole poses.
+
+    Returns the edges of the blocks among the states, and among the observations.
+    """
+    count = len(observations)
+    pose_start = np.flatnonzero(np.diff(index_poses(observations.states), prepend=-1))
+    observation_start = np.searchsorted(observations.state, pose_start)
+    first_pose = np.unique(
+        np.searchsorted(observation_start, np.arange(0, count, block_size)).clip(
+            max=len(pose_start) - 1
+        )
+    )
+    return (
+        [*pose_start[first_pose].tolist(), len(observations.states)],
+        [*observation_start[first_pose].tolist(), count],
+    )
 
 
 def _select(

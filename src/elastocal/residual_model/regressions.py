@@ -461,7 +461,8 @@ def _fit_process(
     variance = hyperparameters.variance
     inputs = inputs / hyperparameters.lengths
     points = inputs[inducing]
-    correlation = _evaluate_matern(points, points)[0] + _JITTER * np.eye(len(points))
+    correlation = _evaluate_matern(points, points)[0]
+    correlation[np.diag_indices_from(correlation)] += _JITTER
     prior_factor = lapack.dpotrf(variance * correlation, lower=1)[0]
     gram = hyperparameters.noise * np.eye(len(points))
     projection = np.zeros((len(points), 3))

@@ -376,8 +376,8 @@ def draw_unit_signals(
                 located.append(kind)
                 # Gears without a signal are those whose torque stays below the one at
                 # which they yield. The visible draws replace them.
-                visible = np.resize(visible, _DRAWS)
-                units.append((np.array(residuals)[visible] / lengths[visible, None]).T)
+                chosen = np.resize(visible, _DRAWS)
+                units.append((np.array(residuals)[chosen] / lengths[chosen, None]).T)
     return tuple(located), np.stack(units, axis=1)
 
 
