@@ -270,6 +270,20 @@ def _expect_deflections(campaign: Campaign, placement: Placement) -> list[np.nda
     return deflections
 
 
+def _list_load_units(
+    measured: np.ndarray, expected: np.ndarray, largest_share: float
+) -> list[_LoadUnit]:
+    """List the units of loads that leave at most a share of the deflections unexplained."""
+    units = []
+    for force, moment, detail in LOAD_UNITS:
+        corrected = expected @ (force, moment)
+        sign = float(np.sign(corrected @ measured))
+        residual, share, ratio = _compare_deflections(measured, sign * corrected)
+        if share <= largest_share:
+            units.append(_LoadUnit(ratio, residual, sign, force, moment, detail))
+    return units
+
+
 def find_wrong_loads(measured: np.ndarray, expected: np.ndarray) -> list[Fault]:
     """Find the sign and the unit that explain deflections far better than the loads as
     written.
@@ -282,13 +296,7 @@ def find_wrong_loads(measured: np.ndarray, expected: np.ndarray) -> list[Fault]:
     before, share_before, _ = _compare_deflections(measured, as_written)
     if share_before < _UNEXPLAINED_SHARE:
         return []
-    candidates = []
-    for force, moment, detail in LOAD_UNITS:
-        corrected = expected @ (force, moment)
-        sign = float(np.sign(corrected @ measured))
-        after, share, ratio = _compare_deflections(measured, sign * corrected)
-        if share <= _UNEXPLAINED_SHARE * share_before:
-            candidates.append(_LoadUnit(ratio, after, sign, force, moment, detail))
+    candidates = _list_load_units(measured, expected, _UNEXPLAINED_SHARE * share_before)
     if not candidates:
         return []
     limit = _EQUIVALENT_RATIO * min(unit.residual_m for unit in candidates)
