@@ -61,13 +61,13 @@ import json, resource, sys, time
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.settings import Settings
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import read_cases
 
 robots, *folders = sys.argv[1:]
 seconds = []
 for folder in folders:
     start = time.process_time()
-    training, held_out = cases_in(folder, robots)
+    training, held_out = read_cases(folder, robots)
     judge(diagnose(training, Settings(), 1), held_out, 1)
     seconds.append(time.process_time() - start)
 peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e9
