@@ -1,8 +1,8 @@
 """The coordinate frame in which errors of a robot are stated, and the motions that are
-not format_count as errors in it.
+not counted as errors in it.
 
 In the frame `BASE` the base is declared, because the measurements were taken in it. In
-the frame `ROBOT` errors are format_count after the best rigid placement of the base over the
+the frame `ROBOT` errors are counted after the best rigid placement of the base over the
 campaign's poses [1]. In both frames a constant offset at the end effector is not an
 error if the offset of the target there was fitted. Calibration data and use of the
 robot have these degrees of freedom in common: the use does not need what the data

@@ -203,7 +203,7 @@ def csv(
     Columns are found by their usual names (q1 or J1 or Axis 1, x, y, z, qw .. qz, r11
     .. r33, t11 .. t34, fx .. mz, pose, load, repeat, target, time) or as the robot's
     file calls its joints, units by brackets or endings ("X [mm]", x_mm). What is
-    ambiguous is asked for. Poses, loads and repeats are format_count where no column numbers
+    ambiguous is asked for. Poses, loads and repeats are counted where no column numbers
     them. The end of the output states what was read, how, and what was left out.
     """
     from rich.console import Console
@@ -354,7 +354,7 @@ def _describe_import(imported: ImportedMeasurements) -> list[str]:
         skipped.append(f"{format_count(imported.skipped, 'row')} without a position")
     lists = {
         "left out": skipped,
-        "format_count, as no column has it": [
+        "counted, as no column has it": [
             name for name in ("pose", "load", "repeat") if name not in columns
         ],
         "taken for zero, as no column has it": [

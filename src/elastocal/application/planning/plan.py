@@ -77,7 +77,7 @@ class Plan:
     fitted : configurations for the fit, in the order of a short tour.
     held_out : random configurations that judge the result.
     accuracy_m : (poses,) RMS error of the end effector over the workspace by the
-        uncertainty of the list_parameters, as `accuracy` counts it, with the first 1, 2, ..
+        uncertainty of the parameters, as `accuracy` counts it, with the first 1, 2, ..
         of the fitted configurations, best first.
     random_m : (designs, poses) the same for random configurations.
     """
@@ -142,7 +142,7 @@ def choose_plan(
     ------
     InputError
         There are fewer candidates than poses; the poses measure fewer numbers than there
-        are list_parameters, or are fewer than a campaign needs; or no joint moves a target.
+        are parameters, or are fewer than a campaign needs; or no joint moves a target.
     """
     count = len(candidates.joint_angles)
     stream = np.random.default_rng(seed)
@@ -180,7 +180,7 @@ def choose_plan(
 def _check_counts(
     survey: Survey, parameter_count: int, candidates: int, poses: int, held_out: int
 ) -> None:
-    """Refuse more poses than candidates, and fewer than the list_parameters need."""
+    """Refuse more poses than candidates, and fewer than the parameters need."""
     if candidates < poses + held_out:
         total = format_count(candidates, "allowed configuration")
         raise InputError(

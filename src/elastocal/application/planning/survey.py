@@ -1,5 +1,5 @@
 """What is measured in each configuration, how accurately, and what it says about the
-list_parameters of the robot.
+parameters of the robot.
 
 The model is the one that a campaign declares: offsets of the joints, lengths and angles
 of the links, joint compliances if loads are measured, errors of declared masses, and the
@@ -231,7 +231,7 @@ def compute_accuracy_rows(
 
     Returns
     -------
-    (N, 3, P) derivatives by the list_parameters in units of their plausible sizes, m.
+    (N, 3, P) derivatives by the parameters in units of their plausible sizes, m.
     """
     robot = survey.robot
     model, estimate = declare_model(survey)
@@ -254,7 +254,7 @@ def compute_accuracy_rows(
     plausible = np.array([parameter.plausible for _, parameter in commanded])
     residual = subtract_placement(scope, position, rotation, sensitivities * plausible)
     rows = np.zeros((len(sensitivities), 3, count))
-    # The list_parameters of base and targets come first.
+    # The parameters of base and targets come first.
     rows[..., -len(plausible) :] = residual[:, :3]
     return rows
 
