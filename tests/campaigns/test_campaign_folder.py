@@ -40,7 +40,7 @@ def test_every_document_is_read_once(validated_cell, read_files):
     for _ in range(2):
         read_campaign(folder)
         read_held_out_campaign(folder)
-        assert folder.files() == [*folder.digests]
+        assert len(folder.files()) == len(folder.digests)
     validation_folder = f"{validated_cell.folder}/../other"
     assert sorted(read_files) == sorted(
         f"{path}/{name}"
@@ -58,14 +58,31 @@ def test_the_files_of_a_campaign_are_listed_without_reading_its_robot(
     assert {Path(file).name for file in read_files} == {"campaign.yaml"}
 
 
-def test_digests_are_those_of_the_files(cell):
-    cell.write()
-    folder = cell.open()
+def test_digests_are_those_of_the_files_by_their_roles(validated_cell):
+    """A role says of which campaign a file is: here all names are there twice."""
+    other = validated_cell.folder.parent / "other" / "measurements.csv"
+    other.write_text(other.read_text() + "\n")
+    roles = (
+        "campaign/campaign.yaml",
+        "campaign/measurements.csv",
+        "robot/arm.yaml",
+        "held_out/campaign/campaign.yaml",
+        "held_out/campaign/measurements.csv",
+        "held_out/robot/arm.yaml",
+    )
+    folder = validated_cell.open()
     expected = {
-        file: hashlib.sha256(Path(file).read_bytes()).hexdigest()
-        for file in folder.files()
+        role: hashlib.sha256(Path(file).read_bytes()).hexdigest()
+        for role, file in zip(roles, folder.files(), strict=True)
     }
     assert folder.digests == expected
+    measurements = validated_cell.folder / "measurements.csv"
+    text = measurements.read_text()
+    measurements.write_text(other.read_text())
+    other.write_text(text)
+    exchanged = validated_cell.open().digests
+    assert exchanged != expected
+    assert sorted(exchanged.values()) == sorted(expected.values())
 
 
 def test_a_campaign_that_holds_out_its_own_poses_has_no_other_folder(cell):

@@ -169,3 +169,24 @@ def test_targets_keep_their_loads_and_have_no_bound_beyond_twice_the_measured_on
     assert targets["status"].tolist() == ["ok"] * 4 + [no_bound] * 4
     np.testing.assert_allclose(targets["fz"], loads)
     assert (targets[["fx", "mx", "my", "mz"]] == 0).all(axis=None)
+
+
+@pytest.mark.parametrize("kept", ["path.csv", "top/made/measurements.csv"])
+def test_targets_replace_neither_the_path_nor_the_measurements(
+    copied_checkout, refusal, path, tmp_path, kept
+):
+    output = tmp_path / kept
+    before = output.read_bytes()
+    message = refusal("correct", "made", path, "--output", output)
+    assert "a file that this command reads" in message
+    assert output.read_bytes() == before
+
+
+def test_targets_replace_a_file_of_the_user_with_force_alone(
+    elastocal, refusal, correct_arguments, output
+):
+    output.write_text("mine\n")
+    assert "no command of elastocal has written" in refusal(*correct_arguments)
+    assert output.read_text() == "mine\n"
+    assert elastocal(*correct_arguments, "--force").exit_code == 0
+    assert elastocal(*correct_arguments).exit_code == 0

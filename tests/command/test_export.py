@@ -122,5 +122,31 @@ def test_the_users_urdf_is_not_replaced(exported, refusal):
     urdf = folder / "robot.urdf"
     text = urdf.read_text()
     message = refusal("export", "made", "--urdf", urdf, "--output", folder)
-    assert "would be replaced" in message
+    assert "a file that this command reads" in message
     assert urdf.read_text() == text
+
+
+def test_an_export_into_the_campaigns_folder_keeps_its_files(
+    copied_checkout, elastocal, refusal
+):
+    """robot.yaml, and a robot.urdf that lies there although no URDF is exported."""
+    robot = Path("made/robot.yaml")
+    urdf = Path("made/robot.urdf")
+    urdf.write_text("<robot/>")
+    before = robot.read_bytes() if robot.exists() else None
+    message = refusal("export", "made", "--output", "made")
+    assert "--force" in message
+    assert urdf.read_text() == "<robot/>"
+    assert (robot.read_bytes() if robot.exists() else None) == before
+
+
+def test_an_export_may_be_repeated_but_not_over_an_edited_file(
+    copied_checkout, elastocal, refusal
+):
+    arguments = ("export", "made", "--output", "out")
+    assert elastocal(*arguments).exit_code == 0
+    assert elastocal(*arguments).exit_code == 0
+    robot = Path("out/robot.yaml")
+    robot.write_text(robot.read_text() + "# mine\n")
+    assert "changed since" in refusal(*arguments)
+    assert elastocal(*arguments, "--force").exit_code == 0

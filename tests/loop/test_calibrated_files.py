@@ -103,14 +103,16 @@ def test_the_origin_names_code_data_and_environment(checkout):
         ).hexdigest()
 
     files = {
-        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
+        f"campaign/{path.name}": hashlib.sha256(path.read_bytes()).hexdigest()
         for path in (checkout / "made").iterdir()
     }
-    files["kuka.yaml"] = hashlib.sha256((ROBOTS / "kuka.yaml").read_bytes()).hexdigest()
+    files["robot/kuka.yaml"] = hashlib.sha256(
+        (ROBOTS / "kuka.yaml").read_bytes()
+    ).hexdigest()
     assert origin == {
         "commit": "c0ffee",
         "code_sha256": digest({ENGINE: compute_sha256(checkout / ENGINE)}),
-        "data_sha256": digest(sorted(files.items())),
+        "data_sha256": digest(files),
         "environment": list_versions(checkout),
     }
 

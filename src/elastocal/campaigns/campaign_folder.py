@@ -112,8 +112,26 @@ class CampaignFolder:
 
     @cached_property
     def digests(self) -> dict[str, str]:
-        """SHA-256 of each of the `files`, by its path."""
-        return {file: compute_sha256(file) for file in self.files()}
+        """SHA-256 of each file from which the campaign is read, by its role.
+
+        A role is ``campaign/`` or ``robot/`` and the name of the file; those of the
+        campaign that validates this one begin with ``held_out/``. The folders
+        themselves may move.
+        """
+        digests = self._digest_own_files()
+        if self.held_out_folder is not None:
+            for role, digest in self.held_out_folder._digest_own_files().items():
+                digests[f"held_out/{role}"] = digest
+        return digests
+
+    def _digest_own_files(self) -> dict[str, str]:
+        """SHA-256 of the files without those of the campaign that validates this one,
+        by their roles."""
+        digests = {}
+        for file in self._own_files():
+            kind = "robot" if file == self.robot_file else "campaign"
+            digests[f"{kind}/{file.name}"] = compute_sha256(file)
+        return digests
 
 
 def read_campaign_folder(path: str | Path, robots_folder: str | Path) -> CampaignFolder:

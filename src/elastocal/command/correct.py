@@ -8,7 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
-from elastocal.command.terminal import load_diagnosed_campaign, print_answer
+from elastocal.command.terminal import (
+    ForceOption,
+    find_workplace,
+    load_diagnosed_campaign,
+    print_answer,
+)
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -51,6 +56,7 @@ def correct(
             " and 10 degrees.",
         ),
     ] = False,
+    force: ForceOption = False,
 ) -> None:
     """Compute the joint targets that reach the wanted poses.
 
@@ -73,11 +79,15 @@ def correct(
         describe_regression,
     )
     from elastocal.exchange.target_path import read_target_path_for
+    from elastocal.io.replacement import check_replaceable, note_written_files
 
     console = Console(stderr=True)
     program = _plan_program(output, language, axes)
-    _check_output(output, program)
+    files = [output, program.path] if program else [output]
+    _check_output(files)
     campaign = load_diagnosed_campaign(folder)
+    inputs = [*campaign.folder.files(), path]
+    check_replaceable(files, inputs, find_workplace(), force=force)
     robot = campaign.calibrated.robot
     axis_names = program.name_axes(robot) if program else ()
     wanted = read_target_path_for(path, robot)
@@ -86,6 +96,7 @@ def correct(
             campaign.calibrated, wanted, path, allow_large_steps=allow_large_steps
         )
     _write_targets(output, corrected, campaign.name, program, axis_names)
+    note_written_files(files, find_workplace())
     details = describe_path_accuracy(corrected)
     remainder = campaign.verdict.remainder
     if remainder and campaign.calibrated.residual_model:
@@ -158,13 +169,12 @@ def _plan_program(output: Path, language: str, axes: str) -> _Program | None:
     return _Program(controller, path, check_name(controller, path), axes)
 
 
-def _check_output(output: Path, program: _Program | None) -> None:
-    """Refuse places where the files cannot be written."""
+def _check_output(files: list[Path]) -> None:
+    """Refuse places where the files cannot be written, before the campaign is read."""
     from elastocal.io.atomic_writes import check_places
 
-    check_places(output)
-    if program:
-        check_places(program.path)
+    check_places(*files)
+    output = files[0]
     if not output.parent.is_dir():
         raise InputError(
             output, "", "no such folder", "a file in a folder that is there"

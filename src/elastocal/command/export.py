@@ -7,9 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
-from elastocal.command.terminal import load_diagnosed_campaign, print_answer
+from elastocal.command.terminal import (
+    ForceOption,
+    find_workplace,
+    load_diagnosed_campaign,
+    print_answer,
+)
 from elastocal.counting import format_count
-from elastocal.errors import InputError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -36,12 +40,14 @@ def export(
             " changed, nothing else."
         ),
     ] = None,
+    force: ForceOption = False,
 ) -> None:
     """Write the calibrated robot: as a robot file, and as the URDF that it came from.
 
     A robot file holds geometry, springs and weights, a URDF the geometry alone. Neither
     holds other effects or the regression on the remainder: what is lost with them is
-    said, and the accuracy stated is without the regression.
+    said, and the accuracy stated is without the regression. Of files that exist only
+    those are replaced that a command of elastocal has written.
     """
     from rich.console import Console
 
@@ -49,14 +55,15 @@ def export(
     from elastocal.application.exported import compute_urdf_deviation_m, fold_effects
     from elastocal.application.statements import format_accuracy
     from elastocal.exchange.urdf_writing import write_calibrated_origins
-    from elastocal.io.atomic_writes import check_places, write_together
+    from elastocal.io.atomic_writes import write_together
+    from elastocal.io.replacement import check_replaceable, note_written_files
 
-    check_places(output / ROBOT, output / URDF)
-    if urdf is not None and (output / URDF).resolve() == urdf.resolve():
-        raise InputError(
-            urdf, "", "the file that would be replaced", "a URDF outside of --output"
-        )
+    files = [output / ROBOT, output / URDF]
     campaign = load_diagnosed_campaign(folder)
+    inputs = campaign.folder.files()
+    if urdf is not None:
+        inputs.append(urdf.as_posix())
+    check_replaceable(files, inputs, find_workplace(), force=force)
     # No file can hold the regression, so the files are of the robot without it.
     calibrated = campaign.without_regression().calibrated
     nominal = calibrated.robot
@@ -77,6 +84,7 @@ def export(
                 corrected, partial / URDF, nominal, folded.robot, commands
             )
             details += [str(output / URDF), *_describe_urdf(corrected, deviation_m)]
+    note_written_files(files, find_workplace())
     print_answer(
         f"{campaign.name}: calibrated robot in {output}",
         details,

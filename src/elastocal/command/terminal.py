@@ -8,7 +8,9 @@ import math
 import re
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+from typer import Option
 
 from elastocal.errors import InputError, escape_control_characters
 
@@ -45,6 +47,13 @@ FARTHEST_TARGET_M = 10.0
 LARGEST_SEED = 2**32 - 1
 MOST_POSES = 10_000
 MOST_ROWS = 10_000_000
+ForceOption = Annotated[
+    bool,
+    Option(
+        "--force",
+        help="Replace files that exist, whoever has written them.",
+    ),
+]
 _SNAKEFILE = "Snakefile"
 # Where a wheel installs the Snakefile, rules and configuration; see `data-files` in
 # pyproject.toml.

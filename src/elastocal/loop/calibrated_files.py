@@ -50,7 +50,7 @@ from elastocal.validation.conformity import (
 from elastocal.verdict import read_verdict
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.fitting.model import Case
@@ -170,12 +170,8 @@ def load_diagnosed(
     trace_jobs([f"{reports}/report.html"], top)
     jobs = trace_jobs([f"{reports}/verdict.json"], top)
     check_sources(jobs, top, f"results of this version: {command}")
-    reader = next(job for job in jobs if f"{results}/campaign.json" in job.outputs)
-    data = _name_files(
-        {file: reader.inputs[file] for file in reader.own or reader.made_inputs}
-    )
-    read_by_jobs = {entry for job in jobs for entry in _name_files(job.inputs)}
-    if not data <= _name_files(campaign_folder.digests) <= read_by_jobs:
+    read_files = read_json(tables / "campaign.json")["files"]
+    if campaign_folder.digests != read_files:
         raise InputError(
             folder,
             "",
@@ -189,20 +185,22 @@ def load_diagnosed(
         case.select(~find_rejected_rows(case, facts)),
         facts,
         read_verdict(verdict_path),
-        _describe_origin(jobs, data),
+        _describe_origin(jobs, read_files),
     )
 
 
-def _name_files(digests: Mapping[str, str]) -> set[tuple[str, str]]:
-    """Return names and digests of files without their folders: the user may have moved
-    them since."""
-    return {(Path(file).name, digest) for file, digest in digests.items()}
-
-
 def _describe_origin(
-    jobs: Sequence[JobRecord], data: Collection[tuple[str, str]]
+    jobs: Sequence[JobRecord], read_files: Mapping[str, str]
 ) -> dict[str, Any]:
-    """Return commit, digests and environment of the jobs behind a verdict."""
+    """Return commit, digests and environment of the jobs behind a verdict.
+
+    Parameters
+    ----------
+    jobs : sequence of JobRecord
+        The jobs, in the order in which they began.
+    read_files : mapping
+        SHA-256 of the campaign's files by their roles.
+    """
     sources: dict[str, str] = {}
     environment = {}
     for job in jobs:
@@ -213,7 +211,7 @@ def _describe_origin(
     return {
         "commit": _join_distinct(job.origin.commit for job in jobs),
         "code_sha256": digest_configuration(sources),
-        "data_sha256": digest_configuration(sorted(data)),
+        "data_sha256": digest_configuration(read_files),
         "environment": environment,
     }
 
@@ -272,9 +270,7 @@ def build_certificate(
         | document.get("certificate", {}),
         "version": __version__,
         "origin": campaign.origin,
-        "files": {
-            Path(file).name: digest for file, digest in campaign.folder.digests.items()
-        },
+        "files": campaign.folder.digests,
         "verdict": verdict.verdict,
         "repeatable": to_document(verdict.repeatable),
         "effects": [effect.name for effect in verdict.effects],

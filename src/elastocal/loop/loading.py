@@ -59,8 +59,9 @@ def load_campaign(
 
     Returns
     -------
-    descriptions : ``campaign`` and ``robot``, the documents, and ``held_out``, the same
-        of the campaign that validates this one, or None.
+    descriptions : ``campaign`` and ``robot``, the documents; ``held_out``, the same of
+        the campaign that validates this one, or None; and ``files``, the digests of all
+        files by their roles.
     training, held_out : measurements to fit and to validate with.
 
     Raises
@@ -75,7 +76,8 @@ def load_campaign(
     if folder.held_out_folder is not None and held_out_campaign is not None:
         held_out_descriptions = _describe(folder.held_out_folder, held_out_campaign)
         held_out = held_out_campaign.measurements
-    return descriptions | {"held_out": held_out_descriptions}, training, held_out
+    descriptions |= {"held_out": held_out_descriptions, "files": folder.digests}
+    return descriptions, training, held_out
 
 
 def read_described_campaign(
