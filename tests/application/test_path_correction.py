@@ -8,7 +8,11 @@ from analysed_robots import analysed
 from made_calibrated import make_calibrated_robot
 from synthetic import make_states
 
-from elastocal.application.calibrated import compute_nominal_poses
+from elastocal.application.calibrated import (
+    ResidualModel,
+    build_observations,
+    compute_nominal_poses,
+)
 from elastocal.application.path_correction import (
     correct_path,
     describe_path_accuracy,
@@ -18,6 +22,8 @@ from elastocal.application.path_correction import (
 )
 from elastocal.errors import InputError
 from elastocal.exchange.target_path import TargetPath
+from elastocal.residual_model.regressions import REGRESSIONS
+from elastocal.residual_model.selection import build_inputs
 
 # Angles from the middle of the limits to a posture that is not singular.
 BENT = np.array([0.0, 0.2, 0.1, 0.3, 0.7, 0.0])
@@ -68,3 +74,24 @@ def test_an_unreachable_pose_is_refused_with_its_line(calibrated):
     wanted.position[1] *= 5.0
     with pytest.raises(InputError, match=r"path\.csv: found line 3 is unreachable"):
         correct_path(calibrated, wanted, "path.csv")
+
+
+@pytest.mark.parametrize("name", list(REGRESSIONS))
+def test_a_path_beyond_the_range_of_a_regression_is_corrected_by_the_physics(
+    calibrated, name
+):
+    """No target lies where the regression acts."""
+    fitted = build_observations(calibrated.states)
+    inputs = build_inputs(calibrated.model, calibrated.estimate, fitted)
+    residual = 1e-4 * np.sin(3.0 * inputs.joint_angles[:, :3])
+    regression = REGRESSIONS[name]
+    predictor = next(regression.fit(inputs, residual, regression.settings[:1], 1))
+    regressed = replace(
+        calibrated, residual_model=ResidualModel(predictor, np.zeros(3), 2e-5, 1.0)
+    )
+    wanted = make_path(calibrated, [0.7, 0.72])
+    path = correct_path(regressed, wanted, "path.csv")
+    physics = correct_path(calibrated, wanted, "path.csv")
+    np.testing.assert_array_equal(
+        path.correction.joint_angles, physics.correction.joint_angles
+    )

@@ -123,3 +123,13 @@ def test_a_process_with_few_inducing_points_learns_from_all_observations(monkeyp
         rms[points, count] = np.sqrt((errors**2).mean())
     assert rms[40, 400] < 0.5 * rms[40, 40]
     assert rms[40, 400] < 3.0 * rms[400, 400]
+
+
+@pytest.mark.parametrize("name", list(REGRESSIONS))
+def test_a_regression_without_queries_predicts_no_rows(name):
+    """A path may have no target within the range of the regression."""
+    inputs, residual = made_inputs(60, seed=1)
+    predictor = fit_first_setting(name, inputs, residual)
+    nowhere = inputs.select(np.zeros(60, bool))
+    assert predictor.mean(nowhere).shape == (0, 3)
+    assert predictor.std(nowhere).shape == (0, 3)

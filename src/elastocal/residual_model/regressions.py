@@ -522,9 +522,8 @@ def compute_harmonic_columns(inputs: Inputs, orders: int) -> np.ndarray:
     harmonics = np.cumprod(waves, axis=1)
     functions = np.stack([harmonics.imag, harmonics.real], axis=2)
     joint_jacobian = inputs.jacobian[:, :, : inputs.joint_angles.shape[1]]
-    return (joint_jacobian[:, :, None, None] * functions[:, None]).reshape(
-        len(inputs), 3, -1
-    )
+    columns = joint_jacobian[:, :, None, None] * functions[:, None]
+    return columns.reshape(len(inputs), 3, np.prod(columns.shape[2:]))
 
 
 def compute_pair_columns(
@@ -541,13 +540,15 @@ def compute_pair_columns(
     products = first[:, :, None, 0] * first[:, None, :, 1]
     functions = np.hstack(
         [
-            products.reshape(len(inputs), -1),
+            # Sizes are written out, because a size of no rows cannot be inferred.
+            products.reshape(len(inputs), products.shape[1] * products.shape[2]),
             np.sin(2.0 * angles),
             np.cos(2.0 * angles),
         ]
     )
     displacement = inputs.jacobian[:, :, displaced_joints, None]
-    return (displacement * functions[:, None, None]).reshape(len(inputs), 3, -1)
+    count = len(displaced_joints) * functions.shape[1]
+    return (displacement * functions[:, None, None]).reshape(len(inputs), 3, count)
 
 
 def _split_into_chunks(inputs: Inputs | np.ndarray) -> list[slice]:
