@@ -77,9 +77,9 @@ def test_digests_are_those_of_the_files_by_their_roles(validated_cell):
     }
     assert folder.digests == expected
     measurements = validated_cell.folder / "measurements.csv"
-    text = measurements.read_text()
-    measurements.write_text(other.read_text())
-    other.write_text(text)
+    contents = measurements.read_bytes()
+    measurements.write_bytes(other.read_bytes())
+    other.write_bytes(contents)
     exchanged = validated_cell.open().digests
     assert exchanged != expected
     assert sorted(exchanged.values()) == sorted(expected.values())
