@@ -1,5 +1,7 @@
 """A file appears complete or not at all."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -118,3 +120,33 @@ def test_only_partial_files_of_killed_runs_are_removed(tmp_path):
     (tmp_path / "mine.partial").touch()
     remove_partials(tmp_path)
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["a", "mine.partial"]
+
+
+def test_partial_files_of_a_living_process_stay(tmp_path):
+    """A run that begins while a command writes leaves the command's files alone."""
+    with (
+        write_atomically(tmp_path / "one.txt") as partial,
+        write_together(tmp_path / "new", ["a"]) as folder,
+    ):
+        Path(partial).write_text("1")
+        (folder / "a").write_text("2")
+        remover = "from elastocal.io.atomic_writes import remove_partials as remove;"
+        subprocess.run(
+            [sys.executable, "-c", f"{remover} remove({str(tmp_path)!r})"], check=True
+        )
+    assert (tmp_path / "one.txt").read_text() == "1"
+    assert (tmp_path / "new" / "a").read_text() == "2"
+
+
+def test_partial_files_of_a_killed_process_go(tmp_path):
+    script = f"""
+import os
+from elastocal.io.atomic_writes import write_atomically, write_together
+with write_atomically({str(tmp_path / "one.txt")!r}) as partial:
+    with write_together({str(tmp_path / "new")!r}, ["a"]):
+        os.kill(os.getpid(), 9)
+"""
+    subprocess.run([sys.executable, "-c", script], check=False)
+    assert len(list(tmp_path.iterdir())) == 2
+    remove_partials(tmp_path)
+    assert not list(tmp_path.iterdir())

@@ -1,6 +1,7 @@
 """Write files atomically: a file appears complete or not at all, and never replaces a
 link, a pipe or a device."""
 
+import fcntl
 import os
 import re
 import secrets
@@ -60,10 +61,13 @@ def check_folder(folder: str | Path) -> None:
 
 
 def remove_partials(folder: str | Path) -> None:
-    """Remove the partial files that killed runs have left below a folder. No run may be
-    at work."""
+    """Remove the partial files that killed processes have left below a folder.
+
+    A process that writes a partial file holds a lock on it. Therefore the files of
+    living processes, such as a certificate that is being written, stay.
+    """
     for path in Path(folder).rglob("*.partial"):
-        if not _PARTIAL.search(path.name):
+        if not _PARTIAL.search(path.name) or _is_being_written(path):
             continue
         if path.is_dir():
             shutil.rmtree(path)
@@ -84,10 +88,11 @@ def write_atomically(path: str | Path, *, empty: bool = False) -> Iterator[str]:
         os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666)
     )
     try:
-        yield partial
-        if not empty and not os.path.getsize(partial):
-            raise FileNotFoundError(2, "nothing that was written", str(path))
-        os.replace(partial, path)
+        with _lock_while_writing(partial):
+            yield partial
+            if not empty and not os.path.getsize(partial):
+                raise FileNotFoundError(2, "nothing that was written", str(path))
+            os.replace(partial, path)
     finally:
         with suppress(FileNotFoundError):
             os.remove(partial)
@@ -117,16 +122,17 @@ def write_together(folder: str | Path, names: Iterable[str]) -> Iterator[Path]:
     partial = Path(_partial_name(folder if is_new else folder / names[0]))
     partial.mkdir()
     try:
-        yield partial
-        if is_new:
-            partial.rename(folder)
-            return
-        check_places(*(folder / name for name in names))
-        for name in names:
-            (folder / name).unlink(missing_ok=True)
-        for name in names:
-            with suppress(FileNotFoundError):
-                (partial / name).rename(folder / name)
+        with _lock_while_writing(partial):
+            yield partial
+            if is_new:
+                partial.rename(folder)
+                return
+            check_places(*(folder / name for name in names))
+            for name in names:
+                (folder / name).unlink(missing_ok=True)
+            for name in names:
+                with suppress(FileNotFoundError):
+                    (partial / name).rename(folder / name)
     finally:
         shutil.rmtree(partial, ignore_errors=True)
 
@@ -138,6 +144,37 @@ def write_text(path: str | Path, text: str) -> None:
         open(partial, "w", encoding="utf-8") as file,
     ):
         file.write(text)
+
+
+@contextmanager
+def _lock_while_writing(partial: str | Path) -> Iterator[None]:
+    """Hold a lock on a partial file or folder. The system releases it however the
+    process ends."""
+    descriptor = os.open(partial, os.O_RDONLY | os.O_NOFOLLOW)
+    try:
+        # A file system without locks gives no protection, but it is no reason to fail.
+        with suppress(OSError):
+            fcntl.flock(descriptor, fcntl.LOCK_SH)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _is_being_written(partial: Path) -> bool:
+    """Whether a living process holds the lock of a partial file or folder."""
+    try:
+        descriptor = os.open(partial, os.O_RDONLY | os.O_NOFOLLOW)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    finally:
+        os.close(descriptor)
+    return False
 
 
 def _partial_name(path: str | Path) -> str:
