@@ -471,7 +471,7 @@ def test_a_fault_in_a_users_own_campaign_is_one_line_that_names_its_file(
         )
     (tmp_path / "a{x}b").mkdir()
     folder = write_users_campaign(tmp_path / "a{x}b")
-    with refused(f"{folder}/campaign.yaml", "", "braces", "without braces"):
+    with refused(f"{folder}/campaign.yaml", "", "'{'", "a path without it"):
         find_users_campaign(
             config | {"campaign": folder}, config_folder / "robots", tmp_path
         )

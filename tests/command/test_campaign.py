@@ -142,8 +142,16 @@ def test_diagnose_runs_the_target_of_the_campaign_and_returns_its_exit_code(
     assert diagnose(installed).stderr.strip() == with_snakefile
 
 
-@pytest.mark.parametrize("mark", ["{x}", ": ", " #", "\n", "\x1b", "\u202e"])
+@pytest.mark.parametrize(
+    "mark", ["{x}", "<x>", "'", '"', ": ", " #", "\n", "\x1b", "\u202e"]
+)
 def test_a_path_that_snakemake_takes_for_something_else_is_refused(
     refusal, tmp_path, mark
 ):
     assert "a path without it" in refusal("diagnose", f"{tmp_path}/a{mark}b")
+
+
+@pytest.mark.parametrize("name", ["cell'", "cell "])
+def test_a_folder_is_not_taken_for_its_neighbour(refusal, tmp_path, name):
+    """Snakemake removes quotes and blanks at the ends of a value."""
+    assert "a path without it" in refusal("diagnose", tmp_path / name)

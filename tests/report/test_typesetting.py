@@ -78,3 +78,14 @@ def test_a_template_has_paragraphs_and_rows_and_keeps_non_breaking_blanks(
     # A missing fact is an error, not a gap in the text.
     with pytest.raises(UndefinedError, match="b"):
         render_sentences("made.txt", FILTERS)
+
+
+def test_a_value_that_has_the_separator_of_cells_fills_one_cell(tmp_path, monkeypatch):
+    """Otherwise the serial number 'A ¦ B' would certify the robot with number A."""
+    template = "# one\n{{ b }}\n\n## rows\nserial ¦ {{ b }} ¦ {{ 1 }}\n"
+    (tmp_path / "made.txt").write_text(template, encoding="utf-8")
+    monkeypatch.setattr(resources, "files", {"elastocal.report": tmp_path}.__getitem__)
+    assert render_sentences("made.txt", {}, b="A ¦ B") == {
+        "one": ["A ¦ B"],
+        "rows": [["serial", "A ¦ B", "1"]],
+    }

@@ -9,6 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import elastocal
+from elastocal.campaigns.campaign_folder import check_workflow_path
 from elastocal.campaigns.importers import (
     read_campaign_sources,
     find_importer,
@@ -74,13 +75,14 @@ def shown_figure(file, caption, category, shows):
 gc.freeze()
 
 # Entries of --config. They are read again here, because Snakemake reads numbers inside a mapping as text.
-CHANGES = [
-    entry
-    for entry in snakemake_internals.config_arguments(workflow)
-    if not entry.startswith("campaign=")
-]
+ENTRIES = [entry.partition("=") for entry in snakemake_internals.config_arguments(workflow)]
+CHANGES = ["".join(entry) for entry in ENTRIES if entry[0] != "campaign"]
 
 try:
+    # Snakemake removes quotes and blanks at the ends of a value, so that a neighbouring folder would be diagnosed.
+    for name, _, value in ENTRIES:
+        if name == "campaign":
+            check_workflow_path(value)
     config.update(override_entries(config, CHANGES))
     STUDY = check_study(
         config,

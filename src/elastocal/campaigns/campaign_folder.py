@@ -14,11 +14,15 @@ from typing import Any
 
 from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, DOCUMENT
 from elastocal.campaigns.measurements import CSV, PARQUET, find_files, is_file_in
-from elastocal.errors import InputError, suggest_names
+from elastocal.errors import InputError, find_control_character, suggest_names
 from elastocal.io.documents import check_document, read_document
 from elastocal.io.records import compute_sha256
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import parse_robot
+
+# What Snakemake takes for something else in a path: wildcards, names of folders, quotes
+# that it removes, and a mapping and a comment of YAML.
+_REFUSED_IN_PATHS = ("{", "}", "<", ">", "'", '"', ": ", " #")
 
 
 @dataclass(frozen=True)
@@ -132,6 +136,23 @@ class CampaignFolder:
             kind = "robot" if file == self.robot_file else "campaign"
             digests[f"{kind}/{file.name}"] = compute_sha256(file)
         return digests
+
+
+def check_workflow_path(path: str) -> None:
+    """Refuse a path that Snakemake would take for another one or for something else: an
+    InputError."""
+    marks = [mark for mark in _REFUSED_IN_PATHS if mark in path]
+    mark = marks[0] if marks else find_control_character(path)
+    if path != path.strip():
+        mark = " "
+    if mark:
+        raise InputError(
+            path,
+            "",
+            repr(mark),
+            "a path without it, which Snakemake does not take for a path; a blank may"
+            " stand inside",
+        )
 
 
 def read_campaign_folder(path: str | Path, robots_folder: str | Path) -> CampaignFolder:

@@ -20,7 +20,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy
 
-from elastocal.campaigns.campaign_folder import CampaignFolder, read_campaign_folder
+from elastocal.campaigns.campaign_folder import (
+    CampaignFolder,
+    check_workflow_path,
+    read_campaign_folder,
+)
 from elastocal.campaigns.holdout import number_close_points
 from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.writing import write_campaign
@@ -517,9 +521,7 @@ def find_user_campaign(
         path = path.relative_to(Path.cwd())
     folder = read_campaign_folder(path, robots_folder)
     for file in folder.files():
-        if set(file) & set("{}"):
-            allowed = "a path without braces, which Snakemake takes for wildcards"
-            raise InputError(file, "", "braces", allowed)
+        check_workflow_path(file)
     name = folder.name
     if name in list_campaigns(config):
         allowed = "a name that no campaign of config.yaml has"

@@ -20,7 +20,7 @@ from elastocal.command.terminal import (
     print_lines,
 )
 from elastocal.counting import format_count
-from elastocal.errors import InputError, find_control_character
+from elastocal.errors import InputError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -29,8 +29,6 @@ _ROBOT = "robot.yaml"
 # Snakemake prints the second line before its logger begins.
 _NOTHING_TO_DO = "Nothing to be done"
 _PROFILE_NOTICE = "Using workflow specific profile"
-# Braces are wildcards of Snakemake; the last two are a mapping and a comment in YAML.
-_REFUSED_IN_PATHS = ("{", "}", ": ", " #")
 
 
 def init(
@@ -144,9 +142,11 @@ def diagnose(
     """
     from rich.console import Console
 
+    from elastocal.campaigns.campaign_folder import check_workflow_path
+
     console = Console(stderr=True)
     campaign = str(folder.resolve())
-    _check_path(folder, campaign)
+    check_workflow_path(campaign)
     workplace = find_workplace()
     snakefile = find_pipeline() / "Snakefile"
     arguments = ["-m", "snakemake", f"-j{cores}", "diagnose"]
@@ -170,19 +170,6 @@ def diagnose(
     if nothing_to_do and not process.returncode:
         _print_outcome(folder, workplace, console)
     raise typer.Exit(process.returncode)
-
-
-def _check_path(folder: Path, path: str) -> None:
-    """Refuse a path with characters that mean something else to Snakemake."""
-    marks = [mark for mark in _REFUSED_IN_PATHS if mark in path]
-    mark = marks[0] if marks else find_control_character(path)
-    if mark:
-        raise InputError(
-            folder,
-            "",
-            repr(mark),
-            "a path without it, which Snakemake does not take for a path",
-        )
 
 
 def _print_outcome(folder: Path, workplace: Path, console: Console) -> None:

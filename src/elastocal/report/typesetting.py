@@ -28,6 +28,11 @@ _LINE_OF_TAGS = re.compile(r"^[ \t]*((?:\{%(?:(?!%\}).)*%\})+)[ \t]*\n", re.MULT
 # A section of a template of sentences: marks, name and text.
 _SECTION = re.compile(r"^(##?) (\w+)\n(.*?)(?=^##? \w+\n|\Z)", re.DOTALL | re.MULTILINE)
 _EMPTY_LINES = r"\n[ \n]*\n"
+# What separates the cells of a row, and what stands for it where it belongs to a value,
+# such as a serial number, until the cells are separated. The latter is a private-use
+# character of Unicode, which means nothing by itself.
+_SEPARATOR = "¦"
+_SEPARATOR_IN_VALUE = "\ue0a6"
 
 
 def load_template(name: str, filters: Mapping[str, Any] | None = None) -> Template:
@@ -39,9 +44,21 @@ def load_template(name: str, filters: Mapping[str, Any] | None = None) -> Templa
         loader=FunctionLoader(_read_template),
         autoescape=name.endswith(".html"),
         undefined=StrictUndefined,
+        finalize=_protect_separators if name.endswith(".txt") else None,
     )
     environment.filters |= filters or {}
     return environment.get_template(name)
+
+
+def _protect_separators(value: Any) -> Any:
+    """Replace separators of cells that belong to a value."""
+    if isinstance(value, str):
+        return value.replace(_SEPARATOR, _SEPARATOR_IN_VALUE)
+    return value
+
+
+def _restore_separators(text: str) -> str:
+    return text.replace(_SEPARATOR_IN_VALUE, _SEPARATOR)
 
 
 def _read_template(name: str) -> str:
@@ -73,12 +90,12 @@ def render_sentences(
         if is_table:
             sections[heading] = [_split_cells(line) for line in stated]
         else:
-            sections[heading] = stated
+            sections[heading] = [_restore_separators(paragraph) for paragraph in stated]
     return sections
 
 
 def _split_cells(line: str) -> list[str]:
-    return [cell.strip(" ") for cell in line.split("¦")]
+    return [_restore_separators(cell.strip(" ")) for cell in line.split(_SEPARATOR)]
 
 
 def compile_document(
