@@ -7,7 +7,6 @@ import json
 import re
 from importlib import import_module, resources
 from inspect import isfunction, signature
-from pkgutil import iter_modules
 from textwrap import dedent, indent
 
 import yaml
@@ -27,7 +26,7 @@ DOCUMENTS = {
 }
 # Each module of table schemas with where its tables lie.
 TABLES = {
-    "elastocal.study": "The study: `data/simulated`, `results`.",
+    "elastocal.study.schemas": "The study: `data/simulated`, `results`.",
     "elastocal.loop.schemas": "The loop: `results/loop`, `reports/loop`.",
     "elastocal_proof.league.schemas": "The league of methods: `results/league`, `reports/league`.",
     "elastocal_proof.blind.schemas": "The closed loop: `results/closed_loop`.",
@@ -120,23 +119,12 @@ def _tables() -> str:
 
 
 def table_schemas(module: str) -> list[TableSchema]:
-    """Every schema of a module, or of those of a package, with those that go with the
-    number of joints."""
+    """Every schema of a module, with those that go with the number of joints."""
     package = import_module(module)
-    if hasattr(package, "__path__"):
-        names = sorted(
-            module_info.name
-            for module_info in iter_modules(package.__path__, f"{module}.")
-        )
-        return [
-            *{
-                schema.name: schema for name in names for schema in table_schemas(name)
-            }.values()
-        ]
     schemas = []
     for name, thing in vars(package).items():
         if isinstance(thing, TableSchema):
-            schemas.append(thing)
+            schemas.append(thing.for_joints(JOINTS))
         elif (
             isfunction(thing)
             and thing.__module__ == module

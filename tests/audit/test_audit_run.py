@@ -6,7 +6,7 @@ from made_audits import CONFIGURATION, ROBOT, failed, forge
 from elastocal.io.origin import describe_provenance as written_by
 from elastocal.io.records import list_recorded_files
 from elastocal.io.storage import write_table
-from elastocal.study.simulation import INITIAL
+from elastocal.study.schemas import INITIAL
 from elastocal_proof.audit.audit_run import (
     CHECKS,
     audit_run,

@@ -14,6 +14,7 @@ from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.next_experiment import propose_experiment
 from elastocal.diagnosis.settings import Settings
+from elastocal.diagnosis.verdict import Hypothesis
 from elastocal.loop.whole import read_cases
 
 # Zero offset of joint 3, rad.
@@ -218,3 +219,51 @@ def test_an_effect_that_is_not_expected_to_help_is_named_and_not_adopted(
     # The next experiment can be planned, too.
     _, experiment = propose_experiment(diagnosis, np.random.default_rng(0))
     assert experiment.best == ("joint_offset",)
+
+
+class AlternatingSearch:
+    """A stand-in for a search: about each model it finds the next one of a cycle, with
+    the probabilities of both."""
+
+    def __init__(self, evidence, probabilities):
+        self.evidence = evidence
+        self.probabilities = probabilities
+        self.starts = []
+
+    def __call__(self, context, subset, start):
+        self.starts.append(start.named)
+        about = start.named or ("second",)
+        ranked = sorted(self.probabilities[about].items(), key=lambda entry: -entry[1])
+        hypotheses = tuple(Hypothesis(names, share, 0) for names, share in ranked)
+        conclusion = replace(
+            self.evidence.conclusion, hypotheses=hypotheses, best=hypotheses[0]
+        )
+        return replace(self.evidence, conclusion=conclusion)
+
+
+@pytest.mark.parametrize(
+    ("of_first_about_second", "kept", "rounds"), [(0.9, "first", 3), (0.6, "second", 4)]
+)
+def test_a_search_between_two_models_settles_on_the_more_probable_one(
+    diagnosis, monkeypatch, of_first_about_second, kept, rounds
+):
+    """About the first model, the second has a probability of 0.8. A search that follows
+    whatever is found alternates to its limit of rounds."""
+    first, second = ("first",), ("second",)
+    search = AlternatingSearch(
+        diagnosis.evidence,
+        {
+            first: {first: 0.2, second: 0.8},
+            second: {first: of_first_about_second, second: 1 - of_first_about_second},
+        },
+    )
+    monkeypatch.setattr(diagnose_module, "_search", search)
+    monkeypatch.setattr(diagnose_module, "_is_linear", lambda *arguments: False)
+    settings = Settings(linearizations=9)
+    context = diagnose_module._Context(diagnosis.case, settings, 1, print)
+    subset = diagnose_module.select_initial_subset(diagnosis.case, settings)
+    start = diagnose_module._SearchRound(0, subset.declared, None)
+    evidence = diagnose_module._search_until_settled(context, subset, start)
+    assert evidence.settled
+    assert evidence.conclusion.best.named == (kept,)
+    assert len(search.starts) == rounds

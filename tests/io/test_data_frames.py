@@ -35,14 +35,7 @@ def test_written_tables_escape_latex_commands_and_name_their_origin(
     assert (tmp_path / "t.csv").read_text(encoding="utf-8") == "x\n0.1\ninf\n"
 
 
-def build_angles_schema(joints):
-    return TableSchema(
-        "angles",
-        tuple(
-            Column(f"q{joint}", "float64", "rad", "an angle")
-            for joint in range(1, joints + 1)
-        ),
-    )
+ANGLES = TableSchema("angles", (Column("q{joint}", "float64", "rad", "an angle"),))
 
 
 def test_tables_of_several_robots_start_with_their_origin_and_lack_no_column(
@@ -61,11 +54,11 @@ def test_tables_of_several_robots_start_with_their_origin_and_lack_no_column(
         }
         write_table(
             paths[-1],
-            build_angles_schema(joints),
+            ANGLES.for_joints(joints),
             [columns],
             {"robot": robot, "noise": noise, "configuration": settings},
         )
-    frame = read_robot_tables(paths, build_angles_schema)
+    frame = read_robot_tables(paths, ANGLES)
     assert frame.index.tolist() == [0, 1, 2, 3] and frame.robot.tolist() == [
         "big",
         "big",
@@ -78,6 +71,4 @@ def test_tables_of_several_robots_start_with_their_origin_and_lack_no_column(
     )
     np.testing.assert_allclose(frame.q2, [0.2, 0.4, 0.2, 0.4])
     np.testing.assert_allclose(frame.q3, [0.3, 0.6, np.nan, np.nan])
-    assert read_frame(paths[0], build_angles_schema(3), ["q2"]).columns.tolist() == [
-        "q2"
-    ]
+    assert read_frame(paths[0], ANGLES.for_joints(3), ["q2"]).columns.tolist() == ["q2"]

@@ -72,7 +72,8 @@ WORKSHOP = Importer({"values": FILE}, read_workshop, ("ur10",))
 
 
 def write_lines(name, targets, notes):
-    return [name, *(" ".join(row) for row in targets.rows(("A", "B")))]
+    rows = targets.values.tolist()
+    return [name, *(" ".join(f"{value:.6f}" for value in row) for row in rows)]
 
 
 LINES = Controller("lines", "lines", ".lines", ("A", "B"), (), "[A-Z]+", "capitals", write_lines)

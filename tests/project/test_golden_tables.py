@@ -32,6 +32,11 @@ from elastocal_proof.blind.closed_loop import (
     count_cases_within_goal,
     summarize_errors,
 )
+from elastocal_proof.blind.locations import (
+    list_locations,
+    tabulate_confusion,
+    tabulate_locations,
+)
 from elastocal_proof.blind.scores import list_intervals
 from elastocal_proof.blind.summary import (
     summarize_figures,
@@ -62,6 +67,13 @@ def made_tables():
             for row in list_intervals(document, stated)
         ]
     )
+    locations = tabulate_locations(
+        [
+            row
+            for document, stated, _ in entries
+            for row in list_locations(document, stated)
+        ]
+    )
     moves = _moves()
     moves.loc[(moves["pose"] == 3) & (moves["model"] == "geometry"), "corrected"] = (
         False
@@ -70,10 +82,12 @@ def made_tables():
     blind = {
         "cases": cases,
         "intervals": spans,
+        "locations": locations,
+        "confusion": tabulate_confusion(locations),
         "rates": tabulate_rates(cases),
         "reliability": tabulate_reliability(cases),
     }
-    blind |= {"summary": summarize_figures(PLAN, cases, spans, SEED)}
+    blind |= {"summary": summarize_figures(PLAN, cases, spans, SEED, locations)}
     loop = {
         "cases": errors,
         "closed_loop": summarize_errors(errors, SEED),
@@ -229,7 +243,7 @@ def folder(tmp_path_factory):
 def test_every_table_is_kept(folder):
     assert {f"{name}.csv" for name in NAMES} >= {
         path.name for path in folder.glob("[bcl]*.csv")
-    } and len(NAMES) == 10
+    } and len(NAMES) == 12
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -12,6 +12,7 @@ from made_blind_documents import (
     tabulate_cases,
 )
 
+from elastocal_proof.blind.locations import list_locations, tabulate_locations
 from elastocal_proof.blind.summary import summarize_by_robot, summarize_figures
 from elastocal_proof.report.blind_page import (
     describe_reached_targets,
@@ -39,10 +40,14 @@ def test_each_quantity_has_its_target_its_limit_and_a_column_for_each_robot():
     cases = tabulate_cases(*entries)
     summary = summarize_figures(PLAN, cases, pd.DataFrame(), 1)
     alone = summarize_by_robot(PLAN, cases, 1)
+    rows = [
+        row for truth, verdict, *_ in entries for row in list_locations(truth, verdict)
+    ]
     page = format_targets_page(
         PLAN,
         summary,
         {"The heavy one": alone["irb7600"], "A soft one": alone["gen3"]},
+        tabulate_locations(rows),
         "full",
         7,
     )
@@ -50,7 +55,7 @@ def test_each_quantity_has_its_target_its_limit_and_a_column_for_each_robot():
         page.startswith("# ") and "blind_pictures --config blind=full seed=7`" in page
     )
     rows = []
-    for line in page.splitlines():
+    for line in page.partition("## Where")[0].splitlines():
         if line.startswith("| "):
             rows.append([cell.strip() for cell in line.strip("|").split("|")])
     figures = {row[0]: dict(zip(rows[0], row, strict=True)) for row in rows[1:]}
@@ -71,6 +76,20 @@ def test_each_quantity_has_its_target_its_limit_and_a_column_for_each_robot():
     assert alarms["outcome"] == "no case"
     assert alarms["cases"] == "0 of 0"
     assert alarms["limit, on a sample"] == ""
+
+
+def test_a_confusion_table_says_at_which_joints_effects_are_stated():
+    truth = make_truth(("joint_tilt", 2))
+    verdicts = [make_verdict("named", make_effect("joint_tilt", 3))]
+    verdicts.append(make_adequate_verdict())
+    rows = [row for verdict in verdicts for row in list_locations(truth, verdict)]
+    entries = [(truth, verdict, make_oracle()) for verdict in verdicts]
+    summary = summarize_figures(PLAN, tabulate_cases(*entries), pd.DataFrame(), 1)
+    page = format_targets_page(PLAN, summary, {}, tabulate_locations(rows), "full", 7)
+    lines = page.partition("## Where")[2].splitlines()
+    heads, _, cells = (split_cells(line) for line in lines if line[:1] == "|")
+    assert heads == ["true", "2", "3", "several", "not stated"]
+    assert cells == ["2", "0", "1", "0", "1"]
 
 
 def test_the_number_of_reached_targets_names_the_robots():

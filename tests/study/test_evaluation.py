@@ -13,10 +13,10 @@ from elastocal.study.evaluation import (
     build_over_studies_table,
     build_replicates_table,
     find_length_with_error,
-    make_metrics_schema,
     unpack_weights,
 )
 from elastocal.study.metrics import compute_position_errors, make_validation_set
+from elastocal.study.schemas import METRICS
 from elastocal.study.simulation import (
     compute_true_deflections,
     draw_bootstrap_weights,
@@ -121,7 +121,7 @@ def test_metrics_are_equations_13_and_14_of_the_averages(
         blocks_of(estimates, weights), judge, "stiffness", counts
     )
     table = build_metrics_table(averages, judge.reference, (0, 1))
-    assert set(table) == {column.name for column in make_metrics_schema(6).columns}
+    assert set(table) == {column.name for column in METRICS.for_joints(6).columns}
     stiffness = (1 / estimates).mean(axis=0)
     delta = 100 * (stiffness * judge.reference - 1)
     np.testing.assert_array_equal(table["length"], [1, 2, 3])

@@ -1,43 +1,15 @@
 """Tables of the study: every column has a name of its own, a meaning, and a unit where
 it has one; and what jobs share."""
 
-from importlib import import_module
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from elastocal import study
-from elastocal.io.storage import TableSchema, read_provenance, write_table
-from elastocal.study.equation_11 import make_identified_schema
-from elastocal.study.evaluation import make_metrics_schema, make_repeated_schema
-from elastocal.study.jobs import (
-    DATA_SET,
-    MEAN_SQUARE,
-    collect_provenance,
-    make_schema,
-    read_frames,
-    write_csvs,
-)
-from elastocal.study.simulation import make_experiments_schema
+from elastocal.io.storage import Column, TableSchema, read_provenance, write_table
+from elastocal.study.jobs import collect_provenance, read_frames, write_csvs
+from elastocal.study.schemas import IDENTIFIED, SCHEMAS
 
-MODULES = [
-    import_module(f"elastocal.study.{path.stem}")
-    for path in Path(study.__file__).parent.glob("[a-z]*.py")
-]
-SCHEMAS = {
-    value.name: value
-    for module in MODULES
-    for value in vars(module).values()
-    if isinstance(value, TableSchema)
-}
-BY_JOINTS = (
-    make_experiments_schema,
-    make_identified_schema,
-    make_metrics_schema,
-    make_repeated_schema,
-)
-ALL = [*SCHEMAS.values(), *(make(joints) for make in BY_JOINTS for joints in (3, 7))]
+ALL = [schema.for_joints(joints) for schema in SCHEMAS.values() for joints in (3, 7)]
 
 
 @pytest.mark.parametrize(
@@ -62,7 +34,7 @@ def test_columns_have_a_name_of_their_own_a_meaning_and_a_unit_but_for_shares_an
 def test_there_is_one_column_for_each_joint(joints):
     assert [
         column.name
-        for column in make_identified_schema(joints).columns
+        for column in IDENTIFIED.for_joints(joints).columns
         if "compl" in column.name
     ][-1] == f"compliance_{joints}"
 
@@ -73,7 +45,11 @@ def test_a_job_keeps_a_table_with_its_origin_and_reads_those_of_all_robots(tmp_p
         wildcards={"robot": "arm"},
         output={},
     )
-    schema = make_schema("made", DATA_SET, MEAN_SQUARE)
+    columns = (
+        Column("data_set", "int32", "", "number"),
+        Column("mean_square", "float64", "m^2", "mean square error"),
+    )
+    schema = TableSchema("made", columns)
     write_table(
         tmp_path / "arm.parquet",
         schema,

@@ -88,6 +88,7 @@ rule score_cases:
     output:
         cases="reports/blind/cases.csv",
         intervals="reports/blind/intervals.csv",
+        locations="reports/blind/locations.csv",
         summary=shown(
             "reports/blind/summary.csv",
             "blind_targets",
@@ -151,6 +152,7 @@ rule write_blind_page:
     input:
         summary=rules.score_cases.output.summary,
         cases=rules.score_cases.output.cases,
+        locations=rules.score_cases.output.locations,
         robots=rules.make_cases.input.robots,
     output:
         page="reports/blind/targets.md",

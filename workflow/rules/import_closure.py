@@ -14,6 +14,7 @@ from grimp.exceptions import SourceSyntaxError
 from elastocal.errors import InputError
 
 PACKAGES = ("elastocal", "elastocal_proof")
+DATA_SUFFIXES = (".csv", ".json", ".yaml")
 
 
 def closure(script: Path, source: Path, *named: str) -> list[Path]:
@@ -48,9 +49,10 @@ def closure(script: Path, source: Path, *named: str) -> list[Path]:
         for package in accumulate(name.split("."), "{}.{}".format):
             if package.split(".")[0] in PACKAGES:
                 files.add(_file(package, source))
-    # A module may read a table that stands beside it under the same name.
-    tables = {file.with_suffix(".json") for file in files}
-    files |= {table for table in tables if table.is_file()}
+    # A module may read a data file that stands beside it under the same name.
+    for file in [*files]:
+        data_files = map(file.with_suffix, DATA_SUFFIXES)
+        files |= {data_file for data_file in data_files if data_file.is_file()}
     return sorted(files - {script})
 
 

@@ -12,12 +12,12 @@ import pandas as pd
 from elastocal.figures import study
 from elastocal.figures.style import save
 from elastocal.io.data_frames import read_robot_tables
-from elastocal.study.evaluation import make_metrics_schema
 from elastocal.study.jobs import read_printed_figures
+from elastocal.study.schemas import METRICS
 
 # Readers of inputs by their names; all other inputs are CSV tables.
 READERS = {
-    "metrics": partial(read_robot_tables, build_schema=make_metrics_schema),
+    "metrics": partial(read_robot_tables, schema=METRICS),
     "printed": read_printed_figures,
 }
 

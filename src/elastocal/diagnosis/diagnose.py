@@ -5,6 +5,7 @@ The held-out poses are opened by `judge`, once, at the end.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -31,7 +32,7 @@ from elastocal.diagnosis.gross_errors import (
 )
 from elastocal.diagnosis.search import screen_terms, search_models
 from elastocal.diagnosis.training_verdict import TrainingResult, state_training_verdict
-from elastocal.diagnosis.verdict import Evidence
+from elastocal.diagnosis.verdict import MIN_REPORTED_PROBABILITY, Evidence
 from elastocal.effects.catalogue import list_effects
 from elastocal.fitting.least_squares import (
     CONVERGENCE_TOLERANCE,
@@ -47,7 +48,7 @@ from elastocal.residual_model.repeatable import detect_repeatable_residual
 from elastocal.validation.held_out import predict_left_out_squares
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from elastocal.campaigns.campaign import Measurements
     from elastocal.data_checks.protocol import Fault
@@ -141,6 +142,26 @@ class _Context:
 
 
 @dataclass(frozen=True)
+class _Visit:
+    """A model about which the problem was linearised in a search.
+
+    Attributes
+    ----------
+    named
+        Mechanisms that the model has beyond the declared one; None for the declared
+        model.
+    noise_m
+        Noise by which the problem was whitened.
+    probabilities
+        Of each set of mechanisms, as the problem states them there.
+    """
+
+    named: tuple[str, ...] | None
+    noise_m: float
+    probabilities: Mapping[tuple[str, ...], float]
+
+
+@dataclass(frozen=True)
 class _SearchRound:
     """Start of one round of a search.
 
@@ -157,6 +178,11 @@ class _SearchRound:
         Largest error common to the measurements of a pose that is considered.
     tested
         The last fit whose residual was tested for a repeatable part, and the outcome.
+    visits
+        Models about which this search was linearised before, in order.
+    closes_cycle
+        Whether the search has returned to a model, and this round leads to the more
+        probable one of those between which it alternates.
     """
 
     number: int
@@ -164,6 +190,8 @@ class _SearchRound:
     named: tuple[str, ...] | None
     max_pose_error_rad: float = np.inf
     tested: tuple[Fit | None, RepeatableResidual | None] = (None, None)
+    visits: tuple[_Visit, ...] = ()
+    closes_cycle: bool = False
 
 
 @dataclass(frozen=True)
@@ -395,38 +423,123 @@ def _run_search_round(
     An error common to the measurements of a pose that is larger than robots repeat to
     must be random. If the residual is a function of the joints, no larger pose error
     than that is considered from then on, and the search goes on.
+
+    A search that returns to a model would alternate for ever, so it settles on the more
+    probable of the models between which it alternates.
     """
     settings = context.settings
-    sample = subset.search_sample
     evidence = _search(context, subset, start)
     fitted = evidence.fitted
     named = evidence.conclusion.best.named
-    model = evidence.named_model
     is_linear = _is_linear(start, evidence, settings)
     # A residual that depends on the joint angles is not random pose error. Test for it
     # again whenever the model has changed.
-    has_large_pose_error = model.pose_error_rad > settings.pose_repeatability_rad
+    pose_error_rad = evidence.named_model.pose_error_rad
+    has_large_pose_error = pose_error_rad > settings.pose_repeatability_rad
     tested = start.tested
     remains = False
     if has_large_pose_error or (is_linear and named not in (start.named, ())):
-        repeatable = detect_repeatable_residual(fitted, sample, context.seed)
+        repeatable = detect_repeatable_residual(
+            fitted, subset.search_sample, context.seed
+        )
         tested = (fitted, repeatable)
         remains = repeatable is not None and repeatable.remains
     max_pose_error_rad = start.max_pose_error_rad
     if remains:
         max_pose_error_rad = settings.pose_repeatability_rad
         if has_large_pose_error:
-            noise = refit.limit_pose_error(fitted, sample, max_pose_error_rad)
-            fitted = _refit_from(fitted, sample, noise, subset.search_tolerance)
-    settled = is_linear and not remains
-    if settled or start.number + 1 >= settings.linearizations:
-        adopted = bool(named) and model_averaging.is_expected_to_help(
-            evidence.design.problem, evidence.posterior, model
-        )
+            fitted = _limit_pose_error(fitted, subset, max_pose_error_rad)
+    following = _SearchRound(
+        start.number + 1,
+        fitted,
+        named,
+        max_pose_error_rad,
+        tested,
+        _list_visits(start, evidence, max_pose_error_rad),
+    )
+    preferred = _choose_from_cycle(following, settings)
+    closes_cycle = start.closes_cycle or preferred == named
+    settled = (is_linear and not remains) or closes_cycle
+    if settled or following.number >= settings.linearizations:
         return replace(
-            evidence, adopted=adopted, settled=settled, fitted=fitted, tested=tested
+            evidence,
+            adopted=_is_adopted(evidence),
+            settled=settled,
+            fitted=fitted,
+            tested=tested,
         )
-    return _SearchRound(start.number + 1, fitted, named, max_pose_error_rad, tested)
+    return replace(following, closes_cycle=preferred is not None)
+
+
+def _limit_pose_error(fitted: Fit, subset: FittedSubset, limit_rad: float) -> Fit:
+    """Fit again with a pose error of no more than a limit."""
+    noise = refit.limit_pose_error(fitted, subset.search_sample, limit_rad)
+    return _refit_from(fitted, subset.search_sample, noise, subset.search_tolerance)
+
+
+def _is_adopted(evidence: Evidence) -> bool:
+    """Whether the effects found enter the model."""
+    return bool(evidence.conclusion.best.named) and model_averaging.is_expected_to_help(
+        evidence.design.problem, evidence.posterior, evidence.named_model
+    )
+
+
+def _list_visits(
+    start: _SearchRound, evidence: Evidence, max_pose_error_rad: float
+) -> tuple[_Visit, ...]:
+    """List the models about which a search was linearised, with the present one; none
+    if the next problem has another limit of the pose error, since no model returns to
+    it."""
+    if max_pose_error_rad != start.max_pose_error_rad:
+        return ()
+    probabilities: dict[tuple[str, ...], float] = defaultdict(float)
+    for hypothesis in evidence.conclusion.hypotheses:
+        probabilities[hypothesis.named] += hypothesis.probability
+    noise_m = start.reference.noise.position_m
+    return (*start.visits, _Visit(start.named, noise_m, probabilities))
+
+
+def _choose_from_cycle(
+    following: _SearchRound, settings: Settings
+) -> tuple[str, ...] | None:
+    """Choose the most probable one of the models between which a search alternates.
+
+    Each problem prefers another of them, because it is exact at another one. Their log
+    probabilities are therefore averaged over the problems: the geometric mean of
+    posteriors that approximate the same one about different points.
+
+    Parameters
+    ----------
+    following
+        The next round, which would start at the model found.
+    settings
+        Settings of the diagnosis.
+
+    Returns
+    -------
+    tuple of str or None
+        Mechanisms of the model; None if the search has not returned to a model, under
+        about the same noise.
+    """
+    noise_m = following.reference.noise.position_m
+    largest_ratio = np.log(settings.relinearize_noise)
+    for number, visit in enumerate(following.visits[:-1]):
+        has_same_noise = abs(np.log(noise_m / visit.noise_m)) <= largest_ratio
+        if visit.named == following.named and has_same_noise:
+            cycle = following.visits[number:]
+            members = [member.named for member in cycle if member.named is not None]
+            return max(members, key=lambda named: _sum_log_probabilities(named, cycle))
+    return None
+
+
+def _sum_log_probabilities(named: tuple[str, ...], cycle: Sequence[_Visit]) -> float:
+    """Sum the log probabilities of a set of mechanisms by several problems. A set that
+    a problem does not list is there at most as probable as the least that are."""
+    probabilities = [
+        max(visit.probabilities.get(named, 0.0), MIN_REPORTED_PROBABILITY)
+        for visit in cycle
+    ]
+    return float(np.log(probabilities).sum())
 
 
 def _is_linear(start: _SearchRound, evidence: Evidence, settings: Settings) -> bool:

@@ -7,79 +7,39 @@ which are recognized by their columns. If a table is ambiguous, an error asks th
 """
 
 import itertools
-import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import resources
 
 import numpy as np
-from scipy import constants
+import yaml
 from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.tables import TextTable
 from elastocal.errors import InputError, suggest_names
-from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 
 LENGTH = "length"
 ANGLE = "angle"
-FORCE = "force"
-MOMENT = "moment"
-TIME = "time"
-TEMPERATURE = "temperature"
 NONE = "none"
+_VOCABULARY = yaml.safe_load(
+    resources.files(__package__).joinpath("column_names.yaml").read_text("utf-8")
+)
 # SI values of the units, by kind of quantity.
-UNITS: dict[str, dict[str, float]] = {
-    LENGTH: {
-        "m": 1.0,
-        "mm": 1e-3,
-        "cm": 1e-2,
-        "um": 1e-6,
-        "µm": 1e-6,
-        "in": constants.inch,
-    },
-    ANGLE: {"rad": 1.0, "deg": math.radians(1.0), "°": math.radians(1.0), "mrad": 1e-3},
-    FORCE: {"N": 1.0, "kN": 1e3, "kgf": constants.kgf, "lbf": constants.lbf},
-    MOMENT: {
-        "Nm": 1.0,
-        "Nmm": 1e-3,
-        "kNm": 1e3,
-        "kgfm": constants.kgf,
-        "lbfft": constants.lbf * constants.foot,
-    },
-    TIME: {
-        "s": 1.0,
-        "ms": 1e-3,
-        "us": 1e-6,
-        "µs": 1e-6,
-        "ns": 1e-9,
-        "min": 60.0,
-        "h": 3600.0,
-    },
-    TEMPERATURE: {"C": 1.0, "°C": 1.0},
-    NONE: {"": 1.0},
-}
+UNITS: dict[str, dict[str, float]] = _VOCABULARY["units"]
 POSITION = ("x", "y", "z")
 TRANSLATION = ("t14", "t24", "t34")
 VECTOR = ("rx", "ry", "rz")
-QUATERNION = ("qw", "qx", "qy", "qz")
 EULER = ("e1", "e2", "e3")
-MATRIX = tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
-HOMOGENEOUS = tuple(f"t{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4))
 NO_ROTATION = "none"
 QUATERNIONS = "quaternion"
 HOMOGENEOUS_MATRICES = "homogeneous"
 EULER_ANGLES = "euler:"
 # Three axes, neighbouring ones different.
 _EULER_NOTATION = re.compile(r"euler:(?!.*(.)\1)([XYZ]{3}|[xyz]{3})")
-# Columns of each notation. The columns of the first three identify their notation.
-_NOTATIONS: dict[str, tuple[str, ...]] = {
-    HOMOGENEOUS_MATRICES: HOMOGENEOUS,
-    QUATERNIONS: QUATERNION,
-    "matrix": MATRIX,
-    "vector": VECTOR,
-    NO_ROTATION: (),
-}
+# Columns of each notation. The columns of some identify their notation.
+_NOTATIONS: dict[str, list[str]] = _VOCABULARY["rotations"]
 _CERTAIN = (HOMOGENEOUS_MATRICES, QUATERNIONS, "matrix")
 _ALLOWED = (
     "none, vector, quaternion, matrix, homogeneous, or euler: with three axes such as"
@@ -92,9 +52,6 @@ UNIT_LENGTH = 2e-3
 # A header with a unit, or with an index, in brackets.
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*(.*?)\s*[\])]\s*")
 _INDEX = re.compile(r"([^\[(]*?)\s*[\[(]\s*([0-9]+)\s*[\])](.*)", re.ASCII)
-# Units of columns without a stated unit. Angles and lengths have two usual units each, so
-# that theirs must be stated.
-_USUAL = {FORCE: "N", MOMENT: "Nm", TIME: "s", TEMPERATURE: "C"}
 # How people write that a column has no unit.
 _NO_UNIT = ("", "-", "1", "#", "–", "none")
 # A header that ends with a unit, such as ``x_mm``.
@@ -105,48 +62,13 @@ _JOINT = re.compile(
     r"(q|j|a|axis|joint|theta|jointangle|actualq|targetq|qactual|rax|jointpos|jointposition|jointpositions|joints)([0-9]{1,2})"
 )
 _APPROACH = re.compile(r"(?:approach|direction)([0-9]{1,2})")
-# Names of a position along an axis, and other names of columns.
-_POSITIONS = (
-    "p{}",
-    "pos{}",
-    "position{}",
-    "measured{}",
-    "{}meas",
-    "translation{}",
-    "point{}",
-)
-_SYNONYMS = {
-    "x": tuple(name.format("x") for name in _POSITIONS),
-    "y": tuple(name.format("y") for name in _POSITIONS),
-    "z": tuple(name.format("z") for name in _POSITIONS),
-    **{
-        f"q{component}": (
-            f"quat{component}",
-            f"orientation{component}",
-            f"rotation{component}",
-        )
-        for component in "wxyz"
-    },
-    **{f"f{axis}": (f"force{axis}",) for axis in "xyz"},
-    **{f"m{axis}": (f"moment{axis}", f"torque{axis}") for axis in "xyz"},
-    **{
-        f"r{axis}": (f"rot{axis}", angle, f"rv{axis}")
-        for axis, angle in zip("xyz", ("roll", "pitch", "yaw"), strict=True)
-    },
-    "pose": ("poseid", "posenumber"),
-    "load": ("loadid", "loadcase"),
-    "repeat": ("repetition", "cycle"),
-    "target": ("reflector", "smr", "marker"),
-    "session": (),
-    "time_s": ("time", "timestamp"),
-    "temperature_c": ("temperature", "temp"),
-    "u95_m": ("u95", "expandeduncertainty"),
-}
 # Names of columns by their simplified headers. Only options name Euler angles, because E1
 # to E3 may be external axes.
-_NAMES = {name: name for name in (*MATRIX, *HOMOGENEOUS)}
-for _name, _synonyms in _SYNONYMS.items():
-    _NAMES |= dict.fromkeys((_name.replace("_", ""), *_synonyms), _name)
+_NAMES: dict[str, str] = {}
+for _columns in _NOTATIONS.values():
+    _NAMES |= zip(_columns, _columns, strict=True)
+for _name, _headers in _VOCABULARY["headers"].items():
+    _NAMES |= dict.fromkeys((_name, *_headers), _name)
 
 
 def list_kinds(name: str) -> tuple[str, ...]:
@@ -155,13 +77,10 @@ def list_kinds(name: str) -> tuple[str, ...]:
     if re.fullmatch(r"q[0-9]+", name):
         # A prismatic joint reports a length.
         return ANGLE, LENGTH
-    if name in (*POSITION, *TRANSLATION, "u95_m"):
-        return (LENGTH,)
-    if name in (*VECTOR, *EULER):
-        return (ANGLE,)
-    if name in WRENCH_NAMES:
-        return (FORCE,) if name.startswith("f") else (MOMENT,)
-    return ({"time_s": TIME, "temperature_c": TEMPERATURE}.get(name, NONE),)
+    for kind, columns in _VOCABULARY["kinds"].items():
+        if name in columns:
+            return (kind,)
+    return (NONE,)
 
 
 def is_name(name: str) -> bool:
@@ -455,9 +374,8 @@ def find_units(
         unit_of_all = given.get("lengths" if is_length else "angles")
         # An option for this column precedes its header, and both precede an option for all
         # columns.
-        unit = (
-            given.get(name) or stated.get(name) or _USUAL.get(kinds[0]) or unit_of_all
-        )
+        usual_unit = _VOCABULARY["usual_units"].get(kinds[0])
+        unit = given.get(name) or stated.get(name) or usual_unit or unit_of_all
         if unit is None:
             problem = f"no unit of {columns[name]!r}"
             option = "--lengths mm" if is_length else "--angles deg"
@@ -474,7 +392,7 @@ def find_units(
     return column_units
 
 
-def list_rotation_columns(notation: str, names: Collection[str]) -> tuple[str, ...]:
+def list_rotation_columns(notation: str, names: Collection[str]) -> Sequence[str]:
     """List the names of the columns of an orientation in a notation.
 
     Euler angles about three different axes may be named after the axes, such as ``rx``, if
@@ -504,7 +422,7 @@ def find_rotation(
     for certain in _CERTAIN:
         if all(name in columns for name in _NOTATIONS[certain]):
             return certain
-    components = [columns[name] for name in QUATERNION if name in columns]
+    components = [columns[name] for name in _NOTATIONS[QUATERNIONS] if name in columns]
     if components:
         raise InputError(
             text.path,

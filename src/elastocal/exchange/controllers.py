@@ -1,20 +1,25 @@
-"""Programs with joint targets in the languages of robot controllers; `CONTROLLERS` has one
-entry for each language.
+"""Programs with joint targets in the languages of robot controllers.
 
-Each program moves slowly to all targets. References: KUKA System Software 8.3, Operating and
+`controllers.yaml` describes each language, and a Jinja template beside it is its program,
+which moves slowly to all targets. References: KUKA System Software 8.3, Operating and
 Programming Instructions for System Integrators (PTP to axis positions); ABB, Technical
 reference manual: RAPID Instructions, 3HAC050917 (MoveAbsJ, jointtarget); FANUC, R-30iB
 Plus Operator's Manual, B-83284EN (joint positions, ASCII upload); Universal Robots, The
 URScript Programming Language for e-Series (movej).
 """
 
+import math
 import re
 import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
+import yaml
+from jinja2 import Environment, PackageLoader, Undefined
 
 from elastocal.counting import format_count
 from elastocal.errors import InputError, format_printable
@@ -36,16 +41,11 @@ class JointTargets:
     units: tuple[str, ...]
     values: np.ndarray
 
-    def rows(self, names: Sequence[str]) -> list[list[str | None]]:
-        """Format the numbers of these axes, target by target; None for an axis that the
-        robot does not have."""
-        rows = []
-        for values in self.values:
-            # Adding zero removes the minus sign of a zero.
-            texts = [f"{round(value, 6) + 0.0:.6f}" for value in values]
-            text_by_axis = dict(zip(self.axes, texts, strict=True))
-            rows.append([text_by_axis.get(name) for name in names])
-        return rows
+    def list_by_axis(self) -> list[dict[str, float]]:
+        """List the targets, each as its values by the names of the axes."""
+        return [
+            dict(zip(self.axes, values, strict=True)) for values in self.values.tolist()
+        ]
 
 
 @dataclass(frozen=True)
@@ -68,8 +68,8 @@ class Controller:
     name: str
     words: str
     suffix: str
-    axes: tuple[str, ...]
-    external: tuple[str, ...]
+    axes: Sequence[str]
+    external: Sequence[str]
     pattern: str
     pattern_words: str
     write: Callable[[str, JointTargets, Sequence[str]], list[str]]
@@ -81,10 +81,8 @@ class Controller:
         return "\n".join([*self.write(name, targets, notes), ""])
 
 
-def format_remarks(
-    notes: Sequence[str], mark: str, longest: int = 100, end: str = ""
-) -> list[str]:
-    """Format notes as lines of comments, each after the language's mark.
+def format_remarks(notes: Sequence[str], longest: int = 100) -> list[str]:
+    """Format notes as lines of comments of at most `longest` characters.
 
     Only characters that no controller reads as syntax are kept: letters and digits of
     ASCII, blanks and ``. , : _ + - / ( )``. All others become question marks.
@@ -92,158 +90,55 @@ def format_remarks(
     lines = []
     for note in notes:
         plain = re.sub(r"[^A-Za-z0-9 .,:_+\-/()]", "?", format_printable(note))
-        lines += [f"{mark}{text}{end}" for text in textwrap.wrap(plain, longest)]
+        lines += textwrap.wrap(plain, longest)
     return lines
 
 
-def _krl(name: str, targets: JointTargets, notes: Sequence[str]) -> list[str]:
-    # A comment that began with FOLD would fold the lines behind it.
-    lines = [
-        "&ACCESS RVP",
-        f"DEF {name}()",
-        "  ; joint targets corrected by elastocal, degrees and mm",
-        *format_remarks(notes, "  ; - "),
-    ]
-    lines += [
-        "  INT i",
-        "  BAS(#INITMOV, 0)",
-        "  FOR i = 1 TO 6",
-        "    $VEL_AXIS[i] = 10",
-        "  ENDFOR",
-    ]
-    for row in targets.rows(targets.axes):
-        pairs = zip(targets.axes, row, strict=True)
-        position = ", ".join(f"{axis} {value}" for axis, value in pairs)
-        lines.append(f"  PTP {{E6AXIS: {position}}}")
-    return [*lines, "END"]
+def _format_decimals(
+    value: float | Undefined, digits: int, without_axis: str = ""
+) -> str:
+    """Format a number, or an axis that the robot does not have."""
+    if isinstance(value, Undefined):
+        return without_axis
+    # Adding zero removes the minus sign of a zero.
+    return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
-def _rapid(name: str, targets: JointTargets, notes: Sequence[str]) -> list[str]:
-    """A module with the targets, and a procedure that moves to all of them with the tool
-    of the caller."""
-    rows = targets.rows((*_RAPID_AXES, *_RAPID_EXTERNAL))
-    lines = [
-        f"MODULE {name}",
-        "  ! joint targets corrected by elastocal, degrees and mm",
-        *format_remarks(notes, "  ! "),
-    ]
-    for number, row in enumerate(rows, 1):
-        axes = ",".join(value or "0" for value in row[:6])
-        external = ",".join(value or "9E9" for value in row[6:])
-        lines.append(f"  CONST jointtarget target_{number} := [[{axes}],[{external}]];")
-    lines += ["", "  PROC go_to_targets(PERS tooldata used_tool)"]
-    lines += [
-        f"    MoveAbsJ target_{number}, v100, fine, used_tool;"
-        for number in range(1, len(rows) + 1)
-    ]
-    return [*lines, "  ENDPROC", "ENDMODULE"]
-
-
-def _tp(name: str, targets: JointTargets, notes: Sequence[str]) -> list[str]:
-    """A program of group 1, which includes extended axes, with three axes on a line and
-    remarks of 32 characters."""
-    names = [axis for axis in (*_TP_AXES, *_TP_EXTERNAL) if axis in targets.axes]
-    units = dict(zip(targets.axes, targets.units, strict=True))
-    rows = targets.rows(names)
-    lines = [
-        f"/PROG  {name.upper()}",
-        "/ATTR",
-        'COMMENT\t\t= "elastocal";',
-        "DEFAULT_GROUP\t= 1,*,*,*,*;",
-        "/MN",
-    ]
-    instructions = [
-        *format_remarks(notes, "  !", 32, " ;"),
-        *(f"J P[{number}] 10% FINE    ;" for number in range(1, len(rows) + 1)),
-    ]
-    lines += [
-        *(
-            f"{number:4d}:{instruction}"
-            for number, instruction in enumerate(instructions, 1)
-        ),
-        "/POS",
-    ]
-    for number, row in enumerate(rows, 1):
-        positions = [
-            f"{axis}= {value} {units[axis]}"
-            for axis, value in zip(names, row, strict=True)
-        ]
-        position_lines = [
-            ",\t".join(positions[first : first + 3])
-            for first in range(0, len(positions), 3)
-        ]
-        lines += [
-            f"P[{number}]{{",
-            "   GP1:",
-            "\tUF : 0, UT : 1,\t",
-            "\t" + ",\n\t".join(position_lines),
-            "};",
-        ]
-    return [*lines, "/END"]
-
-
-def _urscript(name: str, targets: JointTargets, notes: Sequence[str]) -> list[str]:
-    order = [targets.axes.index(axis) for axis in _UR_AXES]
-    lines = [
-        f"def {name}():",
-        "  # joint targets corrected by elastocal, rad",
-        *format_remarks(notes, "  # "),
-    ]
-    for row in np.radians(targets.values[:, order]):
-        position = ", ".join(f"{round(value, 9) + 0.0:.9f}" for value in row)
-        lines.append(f"  movej([{position}], a=0.5, v=0.2)")
-    return [*lines, "end"]
-
-
-_RAPID_AXES = tuple(f"rax_{axis}" for axis in range(1, 7))
-_RAPID_EXTERNAL = tuple(f"eax_{axis}" for axis in "abcdef")
-_TP_AXES = tuple(f"J{axis}" for axis in range(1, 7))
-_TP_EXTERNAL = tuple(f"E{axis}" for axis in range(1, 4))
-_UR_AXES = ("base", "shoulder", "elbow", "wrist1", "wrist2", "wrist3")
-_NAMED = "letters, digits and underscores that begin with"
-_CONTROLLERS = (
-    Controller(
-        name="krl",
-        words="KUKA KRL",
-        suffix=".src",
-        axes=tuple(f"A{axis}" for axis in range(1, 7)),
-        external=tuple(f"E{axis}" for axis in range(1, 7)),
-        pattern=r"[A-Za-z_]\w{0,23}",
-        pattern_words=f"up to 24 {_NAMED} no digit",
-        write=_krl,
-    ),
-    Controller(
-        name="rapid",
-        words="ABB RAPID",
-        suffix=".mod",
-        axes=_RAPID_AXES,
-        external=_RAPID_EXTERNAL,
-        pattern=r"(?!(?i:target_\d+)$)[A-Za-z]\w{0,31}",
-        pattern_words=f"up to 32 {_NAMED} a letter",
-        write=_rapid,
-    ),
-    Controller(
-        name="tp",
-        words="FANUC TP",
-        suffix=".ls",
-        axes=_TP_AXES,
-        external=_TP_EXTERNAL,
-        pattern=r"[A-Za-z]\w{0,35}",
-        pattern_words=f"up to 36 {_NAMED} a letter",
-        write=_tp,
-    ),
-    Controller(
-        name="urscript",
-        words="URScript",
-        suffix=".script",
-        axes=_UR_AXES,
-        external=(),
-        pattern=r"[A-Za-z_]\w*",
-        pattern_words=f"{_NAMED} no digit",
-        write=_urscript,
-    ),
+_TEMPLATES = Environment(
+    loader=PackageLoader(__package__, ""), trim_blocks=True, lstrip_blocks=True
 )
-CONTROLLERS = {controller.name: controller for controller in _CONTROLLERS}
+_TEMPLATES.filters |= {
+    "decimals": _format_decimals,
+    "radians": math.radians,
+    "remarks": format_remarks,
+}
+
+
+def _fill_template(
+    language: str, name: str, targets: JointTargets, notes: Sequence[str]
+) -> list[str]:
+    """Fill the template of a language; returns the lines of the program."""
+    controller = CONTROLLERS[language]
+    program = _TEMPLATES.get_template(f"{language}.jinja").render(
+        name=name,
+        axes=(*controller.axes, *controller.external),
+        units=dict(zip(targets.axes, targets.units, strict=True)),
+        targets=targets.list_by_axis(),
+        notes=notes,
+    )
+    return program.split("\n")
+
+
+def _load_controllers() -> dict[str, Controller]:
+    """Load the languages of this package, by name."""
+    text = resources.files(__package__).joinpath("controllers.yaml").read_text("utf-8")
+    return {
+        name: Controller(name, **facts, write=partial(_fill_template, name))
+        for name, facts in yaml.safe_load(text).items()
+    }
+
+
+CONTROLLERS = _load_controllers()
 
 
 def list_controllers() -> dict[str, Controller]:

@@ -136,7 +136,7 @@ class _Layout:
         return TRANSLATION if self.rotation == HOMOGENEOUS_MATRICES else POSITION
 
     @property
-    def orientation(self) -> tuple[str, ...]:
+    def orientation(self) -> Sequence[str]:
         return list_rotation_columns(self.rotation, self.columns)
 
     @property

@@ -1,6 +1,6 @@
 """Read tables as pandas data frames, and write data frames as CSV, Markdown and LaTeX."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -17,9 +17,7 @@ def read_frame(
     return pd.DataFrame(read_table(path, schema, columns))
 
 
-def read_robot_tables(
-    paths: Iterable[str | Path], build_schema: Callable[[int], TableSchema]
-) -> pd.DataFrame:
+def read_robot_tables(paths: Iterable[str | Path], schema: TableSchema) -> pd.DataFrame:
     """Read tables of several robots into one frame.
 
     The first column is the name of the robot, followed by ``noise_um`` and ``strategy``
@@ -28,8 +26,8 @@ def read_robot_tables(
     Parameters
     ----------
     paths : files of the tables.
-    build_schema : returns the schema for a number of joints. Columns of joints that a
-        robot lacks are empty.
+    schema : schema for any number of joints. Columns of joints that a robot lacks are
+        empty.
     """
     frames = []
     for path in paths:
@@ -42,7 +40,7 @@ def read_robot_tables(
         study = configuration if "robot" in configuration else configuration["study"]
         joints = len(study["robot"]["compliance_urad_per_Nm"])
         frames.append(
-            pd.DataFrame({**columns, **read_table(path, build_schema(joints))})
+            pd.DataFrame({**columns, **read_table(path, schema.for_joints(joints))})
         )
     if not frames:
         return pd.DataFrame({"robot": [], "noise_um": [], "strategy": []})

@@ -6,9 +6,12 @@ sets, so that a table of any length is processed in the same memory. `io.records
 that a file is as it was written.
 """
 
+from __future__ import annotations
+
+import csv
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -59,10 +62,48 @@ class Column:
 
 @dataclass(frozen=True)
 class TableSchema:
-    """Name and columns of a table."""
+    """Name and columns of a table.
+
+    A column with ``{joint}`` in its name stands for one column of each joint.
+    """
 
     name: str
     columns: tuple[Column, ...]
+
+    def for_joints(self, count: int) -> TableSchema:
+        """Return the schema for a robot with so many joints."""
+        columns = []
+        for column in self.columns:
+            copies = count if "{joint}" in column.name else 1
+            for joint in range(1, copies + 1):
+                name = column.name.format(joint=joint)
+                meaning = column.meaning.format(joint=joint)
+                columns.append(replace(column, name=name, meaning=meaning))
+        return replace(self, columns=tuple(columns))
+
+
+def read_schemas(module_file: str) -> dict[str, TableSchema]:
+    """Read the schemas, by name, from the CSV file beside a module that has its name.
+
+    Each row describes one column of a table by the attributes of `Column`.
+    """
+    columns_by_table: dict[str, list[Column]] = {}
+    text = Path(module_file).with_suffix(".csv").read_text("utf-8")
+    for row in csv.DictReader(text.splitlines()):
+        minimum = float(row["minimum"]) if row["minimum"] else None
+        column = Column(
+            row["column"],
+            row["type"],
+            row["unit"],
+            row["meaning"],
+            row["missing"] == "yes",
+            minimum,
+        )
+        columns_by_table.setdefault(row["table"], []).append(column)
+    return {
+        name: TableSchema(name, tuple(columns))
+        for name, columns in columns_by_table.items()
+    }
 
 
 def write_table(
@@ -325,7 +366,7 @@ def _check_values(path: str | Path, column: Column, values: np.ndarray) -> None:
     if not column.missing and not column.is_text:
         checks["finite numbers"] = np.isfinite(values)
     if column.minimum is not None:
-        checks[f">= {column.minimum}"] = values >= column.minimum
+        checks[f">= {column.minimum:g}"] = values >= column.minimum
     for allowed, is_allowed in checks.items():
         if not is_allowed.all():
             row = int(np.argmin(is_allowed))

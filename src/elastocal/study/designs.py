@@ -18,18 +18,11 @@ from elastocal.application.planning.designs import (
     choose_greedily,
     exchange_candidates,
 )
-from elastocal.io.storage import Column
 from elastocal.random_streams import open_stream
 from elastocal.study.in_memory import define_study_step
-from elastocal.study.jobs import (
-    MICRO,
-    concatenate_robots,
-    define_table_step,
-    make_integer_column,
-    make_real_column,
-    make_schema,
-)
+from elastocal.study.jobs import MICRO, concatenate_robots, define_table_step
 from elastocal.study.metrics import evaluate_quadratic_form
+from elastocal.study.schemas import SIMULATED_DESIGNS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -39,34 +32,6 @@ if TYPE_CHECKING:
     from elastocal.study.in_memory import StudyInMemory
 
 RANDOM = "random"
-SIMULATED_DESIGNS = make_schema(
-    "simulated_designs",
-    Column(
-        "load",
-        "text",
-        "",
-        "kind of load: random directions, or one direction in every configuration",
-    ),
-    Column(
-        "design",
-        "text",
-        "",
-        "criterion by which the configurations are chosen, or random",
-    ),
-    make_integer_column("configurations", "configurations of the design", 1),
-    Column(
-        "unobservable",
-        "text",
-        "",
-        "joints that the loads do not move, from 1, with commas between them",
-    ),
-    make_real_column(
-        "rms",
-        "m",
-        "RMS end-effector error over simulated data sets on test configurations",
-    ),
-    make_real_column("std_error", "m", "Monte Carlo standard error of the same"),
-)
 # Number of random designs of each size. All of them together get the data sets of the
 # study.
 _RANDOM_DESIGNS = 200

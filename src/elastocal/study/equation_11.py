@@ -17,20 +17,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.io.storage import TableSchema, read_blocks
+from elastocal.io.storage import read_blocks
 from elastocal.mechanics.elastostatics import (
     build_regressor,
     compute_generalized_forces,
     select_loaded_point,
 )
 from elastocal.mechanics.kinematics import compute_jacobians
-from elastocal.study.jobs import DATA_SET, LENGTH, Job, make_real_column, make_schema
+from elastocal.study.schemas import DEFLECTIONS, EXPERIMENTS
 from elastocal.study.simulation import (
     DEFLECTION_COLUMNS,
-    DEFLECTIONS,
     Experiments,
     list_data_sets,
-    make_experiments_schema,
     make_prefix_index,
     unpack_deflections,
     unpack_experiments,
@@ -38,6 +36,7 @@ from elastocal.study.simulation import (
 
 if TYPE_CHECKING:
     from elastocal.mechanics.chain import Chain
+    from elastocal.study.jobs import Job
     from elastocal.study.strategies import Stage, Strategy
 
 # Columns of one block of experiments and, for each measuring point, of its deflections.
@@ -272,20 +271,6 @@ def _compute_condition_numbers(matrices: np.ndarray) -> np.ndarray:
         return np.sqrt(eigenvalues[..., -1] / np.maximum(eigenvalues[..., 0], 0.0))
 
 
-def make_identified_schema(joints: int) -> TableSchema:
-    """Compliances that a strategy identified; one row for each data set and length."""
-    compliances = [
-        make_real_column(
-            f"compliance_{j}",
-            "rad/(N m)",
-            f"identified compliance of joint {j}",
-            missing=True,
-        )
-        for j in range(1, joints + 1)
-    ]
-    return make_schema("identified", DATA_SET, LENGTH, *compliances)
-
-
 def compute_regressors(
     experiments: Experiments,
     chain: Chain,
@@ -401,7 +386,7 @@ def read_measured_blocks(job: Job, joints: int, points: Iterable[str]) -> Blocks
         )
         for name in points
     }
-    schema = make_experiments_schema(joints)
+    schema = EXPERIMENTS.for_joints(joints)
     return pair_blocks(read_blocks(job.input.experiments, schema), deflections)
 
 

@@ -14,32 +14,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.io.storage import (
-    Column,
-    TableSchema,
-    read_blocks,
-    read_table,
-    write_table,
-)
-from elastocal.study.equation_11 import (
-    identify_blocks,
-    make_identified_schema,
-    read_measured_blocks,
-)
+from elastocal.io.storage import read_blocks, read_table, write_table
+from elastocal.study.equation_11 import identify_blocks, read_measured_blocks
 from elastocal.study.in_memory import load_study
 from elastocal.study.jobs import (
-    LENGTH,
     MICRO,
-    STRATEGY,
     Job,
     add_slugs,
     collect_provenance,
     load_robot,
     load_strategies,
     make_frame,
-    make_integer_column,
-    make_real_column,
-    make_schema,
     write_csvs,
 )
 from elastocal.study.metrics import (
@@ -51,14 +36,19 @@ from elastocal.study.metrics import (
     find_first_length_below,
     make_validation_set,
 )
+from elastocal.study.schemas import (
+    DEFLECTIONS,
+    EXPERIMENTS,
+    IDENTIFIED,
+    METRICS,
+    REPEATED,
+    REPLICATES,
+    WEIGHTS,
+)
 from elastocal.study.simulation import (
     DATA_SETS,
-    DEFLECTIONS,
-    REPLICATE,
     TESTS,
-    WEIGHTS,
     list_data_sets,
-    make_experiments_schema,
     unpack_deflections,
     unpack_experiments,
 )
@@ -108,91 +98,6 @@ _TABLE4_QUANTITIES = (
     ),
     _Table4Quantity("dev", "um", "deviation", MICRO, "deviation"),
 )
-
-SCORES = (
-    make_real_column("k_sigma", "percent", "as in the metrics", missing=True),
-    make_real_column(
-        "k_sigma_fixed_joints", "percent", "as in the metrics", missing=True
-    ),
-    make_real_column("deviation", "m", "as in the metrics", missing=True),
-)
-REPLICATES = make_schema(
-    "replicates",
-    REPLICATE,
-    LENGTH,
-    *SCORES,
-    make_real_column("initial_deviation", "m", "as in the metrics"),
-)
-_NONPOSITIVE_SHARE = make_real_column(
-    "nonpositive_share",
-    "",
-    "share of data sets with a compliance that is not positive",
-)
-_RELATIVE_SPREAD = make_real_column(
-    "relative_spread",
-    "",
-    "largest standard deviation over mean of an identified compliance",
-    missing=True,
-)
-_TRUSTWORTHY = Column(
-    "trustworthy",
-    "bool",
-    "",
-    "whether the mean of 1/c exists in practice: none <= 0 and relative spread <= 0.25",
-)
-
-
-def make_metrics_schema(joints: int) -> TableSchema:
-    """Equations 12-15, averaged over the data sets; one row for each length."""
-    numbers = range(1, joints + 1)
-    stiffness = "the averaged stiffness of joint"
-    quantities = [
-        *(
-            (
-                f"compliance_{j}",
-                "rad/(N m)",
-                f"inverse of {stiffness} {j} (equation 12)",
-            )
-            for j in numbers
-        ),
-        *(
-            (
-                f"delta_k_{j}",
-                "percent",
-                f"relative error of {stiffness} {j} (equation 13)",
-            )
-            for j in numbers
-        ),
-        ("k_sigma", "percent", "sum of delta_k over all joints (equation 14)"),
-        (
-            "k_sigma_fixed_joints",
-            "percent",
-            "sum of delta_k over the joints fixed in the last stage (interpretation R10)",
-        ),
-        (
-            "deviation",
-            "m",
-            "mean end-effector error of the averaged model on test configurations "
-            "(equation 15)",
-        ),
-        (
-            "initial_deviation",
-            "m",
-            "mean deflection of the end-effector on the test configurations",
-        ),
-    ]
-    columns = []
-    for name, unit, meaning in quantities:
-        error = (
-            f"Monte Carlo error over data sets and test configurations of: {meaning}"
-        )
-        columns += [
-            make_real_column(name, unit, meaning, missing=True),
-            make_real_column(f"{name}_std_error", unit, error, missing=True),
-        ]
-    return make_schema(
-        "metrics", LENGTH, *columns, _NONPOSITIVE_SHARE, _RELATIVE_SPREAD, _TRUSTWORTHY
-    )
 
 
 def unpack_weights(columns: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -386,54 +291,6 @@ def find_length_with_error(
     return length, float(np.std(replicate_lengths, ddof=1))
 
 
-def make_repeated_schema(joints: int) -> TableSchema:
-    """Scores of further studies of the same size; one row for each study, strategy and
-    length."""
-    by_compliance = (
-        "by the mean of the compliances where the metrics have that of the stiffnesses"
-    )
-    compliances = [
-        make_real_column(
-            f"compliance_{j}",
-            "rad/(N m)",
-            f"as in the metrics, of joint {j}",
-            missing=True,
-        )
-        for j in range(1, joints + 1)
-    ]
-    return make_schema(
-        "repeated",
-        make_integer_column(
-            "study", "number of the study, from 1; that of the tables is number 0", 1
-        ),
-        STRATEGY,
-        LENGTH,
-        *compliances,
-        *SCORES,
-        make_real_column(
-            "k_sigma_mean_compliance",
-            "percent",
-            f"sum of delta_k over all joints, {by_compliance}",
-            missing=True,
-        ),
-        make_real_column(
-            "k_sigma_fixed_joints_mean_compliance",
-            "percent",
-            f"the same of the fixed joints, {by_compliance}",
-            missing=True,
-        ),
-        make_real_column(
-            "deviation_mean_compliance", "m", f"deviation {by_compliance}", missing=True
-        ),
-        make_real_column(
-            "mean_square",
-            "m^2",
-            "mean square end-effector error of single data sets",
-            missing=True,
-        ),
-    )
-
-
 def evaluate_studies(
     study: StudyInMemory, numbers: Iterable[int], strategies: Sequence[Strategy]
 ) -> Iterator[dict[str, np.ndarray | str]]:
@@ -570,7 +427,7 @@ def identify(job: Job) -> None:
         params.wrench_at,
     )
     origin = collect_provenance(job)
-    schema = make_identified_schema(robot.joints)
+    schema = IDENTIFIED.for_joints(robot.joints)
     write_table(job.output.identified, schema, blocks, origin)
 
     validation = _read_validation_set(job, robot)
@@ -589,7 +446,7 @@ def identify(job: Job) -> None:
         unpack_weights(tests),
     )
     scored = averages, validation.reference, strategy.fixed_joints
-    schema = make_metrics_schema(robot.joints)
+    schema = METRICS.for_joints(robot.joints)
     write_table(job.output.metrics, schema, [build_metrics_table(*scored)], origin)
     replicates = build_replicates_table(*scored)
     write_table(job.output.replicates, REPLICATES, [replicates], origin)
@@ -598,7 +455,7 @@ def identify(job: Job) -> None:
 def _read_validation_set(job: Job, robot: Robot) -> ValidationSet:
     """Read the test configurations of a job with their true deflections."""
     point = robot.chain.end_effector.name
-    schema = make_experiments_schema(robot.joints)
+    schema = EXPERIMENTS.for_joints(robot.joints)
     tests = read_table(job.input.test_experiments, schema)
     ideal = read_table(job.input.test_ideal, DEFLECTIONS, point=point)
     return make_validation_set(
@@ -612,7 +469,7 @@ def _read_validation_set(job: Job, robot: Robot) -> ValidationSet:
 def _read_estimates(job: Job, joints: int) -> Iterator[np.ndarray]:
     """Read the identified compliances (sets, lengths, n), block by block."""
     names = [f"compliance_{j}" for j in range(1, joints + 1)]
-    schema = make_identified_schema(joints)
+    schema = IDENTIFIED.for_joints(joints)
     for block in read_blocks(job.output.identified, schema, ["data_set", *names]):
         sets = len(list_data_sets(block))
         yield np.stack([block[name].reshape(sets, -1) for name in names], axis=-1)
@@ -624,7 +481,7 @@ def repeat_studies(job: Job) -> None:
     blocks = evaluate_studies(
         study, range(1, job.params.studies + 1), load_strategies(job)
     )
-    schema = make_repeated_schema(study.robot.joints)
+    schema = REPEATED.for_joints(study.robot.joints)
     write_table(job.output.repeated, schema, blocks, collect_provenance(job))
 
 
@@ -633,6 +490,6 @@ def tabulate_studies(job: Job) -> None:
     from elastocal.io.data_frames import read_robot_tables
 
     params = job.params
-    studies = read_robot_tables(job.input.studies, make_repeated_schema)
+    studies = read_robot_tables(job.input.studies, REPEATED)
     table = build_over_studies_table(studies, params.length, params.limits)
     write_csvs(job, table=add_slugs(table, params.slugs))

@@ -1,5 +1,5 @@
-"""What the questions of the study share: declarations of tables, the robot and the
-strategies of a rule, and tables of every robot as data frames.
+"""What the questions of the study share: the robot and the strategies of a rule, and
+tables of every robot as data frames.
 
 Functions that make a data frame import pandas themselves, because most jobs make none.
 """
@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Protocol
 
 from elastocal.io.origin import SOURCES_DIGEST, STEP, describe_provenance
-from elastocal.io.storage import Column, TableSchema
 from elastocal.mechanics.robot import set_target_offset
 from elastocal.mechanics.robot_file import parse_robot
 from elastocal.study.strategies import strategy_from_document
@@ -19,52 +18,12 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from elastocal.io.storage import TableSchema
     from elastocal.mechanics.robot import Robot
     from elastocal.study.strategies import Strategy
 
 MICRO = 1e6
 MILLI = 1e3
-
-
-def make_schema(name: str, *columns: Column) -> TableSchema:
-    """Declare a table; the declaration belongs next to the function that fills it."""
-    return TableSchema(name, columns)
-
-
-def make_real_column(
-    name: str,
-    unit: str,
-    meaning: str,
-    *,
-    missing: bool = False,
-    minimum: float | None = None,
-) -> Column:
-    """Declare a column of real numbers; with `missing`, some may be NaN or infinite."""
-    return Column(name, "float64", unit, meaning, missing, minimum)
-
-
-def make_integer_column(name: str, meaning: str, minimum: int | None = None) -> Column:
-    """Declare a column of counts or numbers of objects."""
-    return Column(name, "int32", "", meaning, minimum=minimum)
-
-
-def make_group_column(name: str, meaning: str) -> Column:
-    """Declare a column of text that is constant in each row group."""
-    return Column(name, "string", "", meaning)
-
-
-DATA_SET = make_integer_column("data_set", "number of the data set, from 0", 0)
-CONFIGURATION = make_integer_column(
-    "configuration", "number of the configuration in its data set, from 0", 0
-)
-LENGTH = make_integer_column(
-    "length",
-    "data set length ds: how many configurations, from the first, were used",
-    1,
-)
-STRATEGY = make_group_column("strategy", "name of the strategy; a row group holds one")
-MEAN_SQUARE_MEANING = "mean square end-effector error on test configurations"
-MEAN_SQUARE = make_real_column("mean_square", "m^2", MEAN_SQUARE_MEANING, missing=True)
 
 
 class Job(Protocol):

@@ -22,7 +22,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.io.storage import Column
 from elastocal.mechanics.elastostatics import (
     build_extended_chain,
     compute_beam_axes,
@@ -30,18 +29,9 @@ from elastocal.mechanics.elastostatics import (
 )
 from elastocal.mechanics.kinematics import compute_jacobians
 from elastocal.study.in_memory import define_study_step
-from elastocal.study.jobs import (
-    DATA_SET,
-    LENGTH,
-    MEAN_SQUARE_MEANING,
-    MICRO,
-    define_table_step,
-    make_frame,
-    make_integer_column,
-    make_real_column,
-    make_schema,
-)
+from elastocal.study.jobs import MICRO, define_table_step, make_frame
 from elastocal.study.points import score_rms
+from elastocal.study.schemas import LADDER
 from elastocal.study.simulation import draw_measurement_noise
 
 if TYPE_CHECKING:
@@ -53,15 +43,6 @@ if TYPE_CHECKING:
     from elastocal.study.in_memory import StudyInMemory
     from elastocal.study.simulation import Experiments
 
-LADDER = make_schema(
-    "ladder",
-    make_real_column("noise", "m, rad", "standard deviation of the measurements"),
-    LENGTH,
-    DATA_SET,
-    make_integer_column("link_springs", "number of link springs in the model", 0),
-    Column("chosen", "bool", "", "whether cross-validation stops here"),
-    make_real_column("mean_square", "m^2", MEAN_SQUARE_MEANING),
-)
 CHOSEN = "by cross-validation"
 FOLDS = 5
 # Nonzero elements (row, column) of the compliance of a beam along x; those off the

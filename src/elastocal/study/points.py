@@ -16,18 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.study.in_memory import define_study_step
-from elastocal.study.jobs import (
-    DATA_SET,
-    LENGTH,
-    MEAN_SQUARE,
-    MICRO,
-    Job,
-    make_frame,
-    make_group_column,
-    make_schema,
-    read_frames,
-    write_csvs,
-)
+from elastocal.study.jobs import MICRO, Job, make_frame, read_frames, write_csvs
+from elastocal.study.schemas import BUDGET
 from elastocal.study.simulation import draw_bootstrap_weights, make_prefix_index
 from elastocal.study.strategies import Stage, Strategy
 
@@ -41,13 +31,6 @@ if TYPE_CHECKING:
     Frames = Mapping[str, pd.DataFrame]
     PointSets = Mapping[str, Sequence[str]]
 
-BUDGET = make_schema(
-    "budget",
-    make_group_column("points", "set of measuring points; a row group holds one"),
-    DATA_SET,
-    LENGTH,
-    MEAN_SQUARE,
-)
 # Suffix of a point that is measured a second time in a configuration, with new noise.
 _AGAIN = "/again"
 # A normal distribution has 95 % within this number of standard deviations.

@@ -34,7 +34,6 @@ import pandas as pd
 from scipy.special import stdtr
 
 from elastocal.io.data_frames import read_robot_tables
-from elastocal.study.evaluation import make_repeated_schema
 from elastocal.study.jobs import (
     MICRO,
     MILLI,
@@ -44,7 +43,8 @@ from elastocal.study.jobs import (
     write_csvs,
 )
 from elastocal.study.metrics import extrapolate_length
-from elastocal.study.simulation import INITIAL, compute_statistics
+from elastocal.study.schemas import INITIAL, REPEATED
+from elastocal.study.simulation import compute_statistics
 from elastocal.study.tables import COMPLIANCE, Results, read_results
 
 # A figure differs from the study if its p value, corrected for the number of figures, is
@@ -439,7 +439,7 @@ def compare_with_studies(job: Job) -> None:
     """Write every printed figure among further studies, and the joint test."""
     compared = pd.read_csv(job.input.beside, dtype={"table": str})
     initial = read_frames(job, job.input.initial, INITIAL)
-    studies = read_robot_tables(job.input.studies, make_repeated_schema)
+    studies = read_robot_tables(job.input.studies, REPEATED)
     printed = read_printed_figures(job.input.reference)
     length = job.params.length
     write_csvs(

@@ -13,12 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.io.origin import describe_provenance
-from elastocal.io.storage import TableSchema, read_blocks, write_table
+from elastocal.io.storage import read_blocks, write_table
 from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.components import (
     COMPONENT_NAMES,
-    COMPONENTS,
-    WRENCH,
     WRENCH_NAMES,
 )
 from elastocal.mechanics.elastostatics import (
@@ -32,17 +30,8 @@ from elastocal.mechanics.elastostatics import (
 from elastocal.mechanics.kinematics import compute_jacobians, compute_poses
 from elastocal.mechanics.robot_file import parse_joint_limits
 from elastocal.random_streams import draw_data_sets
-from elastocal.study.jobs import (
-    CONFIGURATION,
-    DATA_SET,
-    Job,
-    collect_provenance,
-    load_robot,
-    make_group_column,
-    make_integer_column,
-    make_real_column,
-    make_schema,
-)
+from elastocal.study.jobs import Job, collect_provenance, load_robot
+from elastocal.study.schemas import DEFLECTIONS, EXPERIMENTS, INITIAL, WEIGHTS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -55,64 +44,11 @@ if TYPE_CHECKING:
 # Block size: a step holds this many data sets in memory at a time.
 SETS_PER_BLOCK = 500
 
-DEFLECTIONS = make_schema(
-    "deflections",
-    make_group_column("point", "measuring point; a row group holds one"),
-    DATA_SET,
-    CONFIGURATION,
-    *(
-        make_real_column(name, unit, f"{meaning}, loaded against unloaded")
-        for name, unit, meaning in COMPONENTS
-    ),
-)
 # The columns that `unpack_deflections` needs.
 DEFLECTION_COLUMNS = ("configuration", *COMPONENT_NAMES)
 
-INITIAL = make_schema(
-    "initial",
-    DATA_SET,
-    make_integer_column("configurations", "configurations in the data set", 1),
-    make_real_column(
-        "mean",
-        "m",
-        "mean over the data set of the end-effector's displacement under load",
-        minimum=0,
-    ),
-    make_real_column("mean_square", "m^2", "mean square of the same", minimum=0),
-    make_real_column("maximum", "m", "largest of the same", minimum=0),
-)
-
-
 DATA_SETS = "data sets"
 TESTS = "test configurations"
-REPLICATE = make_integer_column(
-    "replicate", "number of the bootstrap replicate, from 1", 1
-)
-WEIGHTS = make_schema(
-    "weights",
-    make_group_column(
-        "members",
-        "what counts: data sets or test configurations; a row group holds one",
-    ),
-    make_integer_column(
-        "number", "number of the data set or test configuration, from 0", 0
-    ),
-    REPLICATE,
-    make_integer_column("count", "how often it counts in the replicate", 0),
-)
-
-
-def make_experiments_schema(joints: int) -> TableSchema:
-    """Configurations and wrenches; one row for each loaded configuration."""
-    angles = [
-        make_real_column(f"q{j}", "rad", f"angle of joint {j}")
-        for j in range(1, joints + 1)
-    ]
-    wrench = [
-        make_real_column(name, unit, f"{meaning}, at the end-effector")
-        for name, unit, meaning in WRENCH
-    ]
-    return make_schema("experiments", DATA_SET, CONFIGURATION, *angles, *wrench)
 
 
 @dataclass(frozen=True)
@@ -536,7 +472,7 @@ def draw_experiments(job: Job) -> None:
         )
         for sets in split_data_sets(params.data_sets)
     )
-    schema = make_experiments_schema(chain.coordinates)
+    schema = EXPERIMENTS.for_joints(chain.coordinates)
     write_table(job.output.experiments, schema, blocks, describe_provenance(params))
 
 
@@ -557,7 +493,7 @@ def draw_weights(job: Job) -> None:
 def simulate(job: Job) -> None:
     """Simulate the deflections of one robot without noise."""
     robot = load_robot(job)
-    schema = make_experiments_schema(robot.joints)
+    schema = EXPERIMENTS.for_joints(robot.joints)
     experiments = read_blocks(job.input.experiments, schema)
     blocks = simulate_blocks(experiments, robot, job.params.wrench_at)
     write_table(job.output.ideal, DEFLECTIONS, blocks, describe_provenance(job.params))

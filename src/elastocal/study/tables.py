@@ -18,17 +18,10 @@ import pandas as pd
 
 from elastocal.io.data_frames import read_robot_tables
 from elastocal.mechanics.robot_file import parse_robot
-from elastocal.study.evaluation import (
-    REPLICATES,
-    find_length_with_error,
-    make_metrics_schema,
-)
+from elastocal.study.evaluation import find_length_with_error
 from elastocal.study.jobs import MICRO, MILLI, Job, add_slugs, read_frames, write_csvs
-from elastocal.study.simulation import (
-    INITIAL,
-    compute_statistics,
-    draw_bootstrap_weights,
-)
+from elastocal.study.schemas import INITIAL, METRICS, REPLICATES
+from elastocal.study.simulation import compute_statistics, draw_bootstrap_weights
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -394,8 +387,8 @@ def format_value(value: float | str, error: float, digits: int = 3) -> str:
 def read_results(job: Job, noise_um: float, length: int) -> Results:
     """Read the metrics and bootstrap replicates of all strategies for tables of a noise
     level and a length."""
-    metrics = read_robot_tables(job.input.metrics, make_metrics_schema)
-    replicates = read_robot_tables(job.input.replicates, lambda joints: REPLICATES)
+    metrics = read_robot_tables(job.input.metrics, METRICS)
+    replicates = read_robot_tables(job.input.replicates, REPLICATES)
     return Results(metrics, replicates, noise_um, length)
 
 
@@ -424,7 +417,7 @@ def tabulate_initial(job: Job) -> None:
 def tabulate_identified(job: Job) -> None:
     """Write Table 3, which needs no replicates."""
     params = job.params
-    metrics = read_robot_tables(job.input.metrics, make_metrics_schema)
+    metrics = read_robot_tables(job.input.metrics, METRICS)
     results = Results(metrics, pd.DataFrame(), params.noise_um, params.length)
     write_csvs(job, table=build_table3(results, params.robots, params.strategy))
 

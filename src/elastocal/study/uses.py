@@ -34,16 +34,12 @@ from elastocal.application.inverse_kinematics import (
     find_beyond_limits,
     solve_path,
 )
-from elastocal.study.evaluation import REPLICATES, make_metrics_schema
+from elastocal.study import schemas
 from elastocal.study.in_memory import define_study_step
 from elastocal.study.jobs import (
-    DATA_SET,
     MICRO,
-    STRATEGY,
     Job,
     make_frame,
-    make_real_column,
-    make_schema,
     read_frames,
     write_csvs,
 )
@@ -63,36 +59,6 @@ if TYPE_CHECKING:
     # Scores of each robot by metric and strategy.
     Scores = Mapping[str, Mapping[str, Mapping[str, Score]]]
 
-USES = make_schema(
-    "uses",
-    STRATEGY,
-    DATA_SET,
-    make_real_column("mean", "m", "mean end-effector error on test configurations"),
-    make_real_column("mean_square", "m^2", "mean square of the same"),
-    make_real_column("p95", "m", "95th percentile of the same"),
-    make_real_column(
-        "pooled_p95",
-        "m",
-        "95th percentile over test configurations and data sets, the same in every row",
-    ),
-    make_real_column(
-        "pooled_p95_influence",
-        "m",
-        "influence of the data set on the pooled percentile",
-    ),
-    make_real_column(
-        "iso_9283", "m", "largest error at the five poses of ISO 9283", missing=True
-    ),
-    make_real_column(
-        "path_mean_square",
-        "m^2",
-        "mean square error along the milling path",
-        missing=True,
-    ),
-    make_real_column(
-        "path_max", "m", "largest error along the milling path", missing=True
-    ),
-)
 REFERENCE = "rms_um"
 # Metrics with their words, in the order of the tables.
 METRICS = {
@@ -108,7 +74,7 @@ METRICS = {
     "k_sigma_percent_fixed_joints": "k_Σ of the fixed joints",
 }
 # Metrics that are the root of a mean square over data sets, and those that are a mean,
-# by the columns of `USES`.
+# by the columns of the uses table.
 _RMS_COLUMNS = {REFERENCE: "mean_square", "path_rms_um": "path_mean_square"}
 _MEAN_COLUMNS = {
     "mean_um": "mean",
@@ -389,8 +355,8 @@ def tabulate_uses(job: Job) -> None:
     """Write scores and pairs of the strategies on all robots."""
     from elastocal.io.data_frames import read_robot_tables
 
-    metrics = read_robot_tables(job.input.metrics, make_metrics_schema)
-    replicates = read_robot_tables(job.input.replicates, lambda joints: REPLICATES)
+    metrics = read_robot_tables(job.input.metrics, schemas.METRICS)
+    replicates = read_robot_tables(job.input.replicates, schemas.REPLICATES)
     scores = {
         robot: score_strategies(
             uses,
@@ -398,10 +364,10 @@ def tabulate_uses(job: Job) -> None:
             replicates[replicates.robot == robot],
             job.params.length,
         )
-        for robot, uses in read_frames(job, job.input.uses, USES).items()
+        for robot, uses in read_frames(job, job.input.uses, schemas.USES).items()
     }
     ranks = build_ranks_table(scores, job.params.classical)
     write_csvs(job, scores=ranks, pairs=build_pairs_table(scores))
 
 
-judge_in_use = define_study_step(USES, evaluate_uses)
+judge_in_use = define_study_step(schemas.USES, evaluate_uses)

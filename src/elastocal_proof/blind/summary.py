@@ -15,6 +15,7 @@ from elastocal.io.json_files import read_json
 from elastocal.random_streams import open_stream
 from elastocal_proof.blind.cases import PROOF, TUNED, Plan
 from elastocal_proof.blind.folders import load_ground_truth
+from elastocal_proof.blind.locations import list_locations, tabulate_locations
 from elastocal_proof.blind.scores import build_case_row, compute_rate, list_intervals
 
 Tables = Mapping[str, pd.DataFrame]
@@ -46,7 +47,11 @@ def iterate_rows(table: pd.DataFrame) -> Iterator[Any]:
 
 
 def summarize_figures(
-    plan: Plan, cases: pd.DataFrame, intervals: pd.DataFrame, seed: int
+    plan: Plan,
+    cases: pd.DataFrame,
+    intervals: pd.DataFrame,
+    seed: int,
+    locations: pd.DataFrame | None = None,
 ) -> pd.DataFrame:
     """Compute every figure of the plan and compare it with its target.
 
@@ -61,6 +66,8 @@ def summarize_figures(
         Rows of `scores.build_case_row` and of `scores.list_intervals`.
     seed : int
         Seed of the bootstrap.
+    locations : DataFrame, optional
+        Rows of `locations.list_locations`.
 
     Returns
     -------
@@ -79,6 +86,7 @@ def summarize_figures(
         "cases": cases,
         "statements": cases[cases.stated.notna()],
         "intervals": intervals,
+        "locations": tabulate_locations([]) if locations is None else locations,
     }
     rows = [
         row
@@ -106,7 +114,7 @@ def _list_figure_rows(
 ) -> Iterator[dict[str, Any]]:
     """List the rows of the summary that one entry of the plan asks for."""
     table = tables[figure.get("table", "cases")]
-    if figure.get("table") == "intervals" and table.empty:
+    if figure.get("table") in ("intervals", "locations") and table.empty:
         return
     selected = table.query(figure["of"]) if "of" in figure else table
     target = figure.get("target")
@@ -345,15 +353,19 @@ def score_cases(job: Any) -> None:
         oracles |= read_json(path)
     case_rows = []
     interval_rows = []
+    location_rows = []
     for name, truth in truths.items():
         verdict = verdicts[name]
         case_rows.append(build_case_row(plan, truth, verdict, **oracles[name]))
         interval_rows += list_intervals(truth, verdict)
+        location_rows += list_locations(truth, verdict)
     cases = pd.DataFrame(case_rows)
     intervals = pd.DataFrame(interval_rows)
+    locations = tabulate_locations(location_rows)
     write_csv(job.output.cases, cases)
     write_csv(job.output.intervals, intervals)
+    write_csv(job.output.locations, locations)
     write_csv(job.output.rates, tabulate_rates(cases))
     write_csv(job.output.reliability, tabulate_reliability(cases))
-    summary = summarize_figures(plan, cases, intervals, job.params.seed)
+    summary = summarize_figures(plan, cases, intervals, job.params.seed, locations)
     write_csv(job.output.summary, summary)

@@ -13,6 +13,7 @@ from elastocal.io.atomic_writes import write_text
 from elastocal.io.documents import read_document
 from elastocal.report.words import format_number
 from elastocal_proof.blind.cases import PROOF, Plan
+from elastocal_proof.blind.locations import tabulate_confusion
 from elastocal_proof.blind.summary import (
     BY_THE_BEST,
     OVER_THE_BEST,
@@ -30,6 +31,7 @@ def format_targets_page(
     plan: Plan,
     summary: pd.DataFrame,
     summaries_by_robot: Mapping[str, pd.DataFrame],
+    locations: pd.DataFrame,
     size: str,
     seed: int,
 ) -> str:
@@ -43,6 +45,8 @@ def format_targets_page(
         Summary of all robots together.
     summaries_by_robot
         Tables of `summary.summarize_by_robot` by the names of the robots.
+    locations
+        Rows of `locations.list_locations`.
     size, seed
         Configuration of the run.
     """
@@ -57,7 +61,21 @@ of the others a bootstrap over cases.
 {describe_reached_targets(summary)}
 
 {format_table(rows)}
+
+## Where
+
+Effects that act at one joint, or link, by its number and by the number that the \
+verdict states beside the right name.
+
+{_format_confusion(locations)}
 """
+
+
+def _format_confusion(locations: pd.DataFrame) -> str:
+    confusion = tabulate_confusion(locations)
+    columns = list(map(str, confusion.columns))
+    cells = confusion.itertuples(index=False)
+    return format_table([dict(zip(columns, row, strict=True)) for row in cells])
 
 
 def describe_reached_targets(summary: pd.DataFrame) -> str:
@@ -152,5 +170,8 @@ def write_blind_page(job: Any) -> None:
     names = {Path(file).stem: read_document(file)["name"] for file in job.input.robots}
     tables = summarize_by_robot(params.plan, cases, params.seed)
     by_robot = {names[robot]: table for robot, table in tables.items()}
-    page = format_targets_page(params.plan, summary, by_robot, params.size, params.seed)
+    locations = pd.read_csv(job.input.locations)
+    page = format_targets_page(
+        params.plan, summary, by_robot, locations, params.size, params.seed
+    )
     write_text(job.output.page, page)
