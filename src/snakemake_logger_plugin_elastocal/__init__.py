@@ -40,6 +40,8 @@ _SILENT_MESSAGES = (
 )
 _LOCKED = "Directory cannot be locked"
 _FAILED = "At least one job did not complete successfully."
+# What a successful job writes to its log at its end (workflow/scripts/job.py).
+_DONE = "done"
 # Locks of killed runs are removed before (workflow/rules/one_run.py), so that a lock
 # belongs to a run at work.
 _LOCKED_BY_ANOTHER_RUN = (
@@ -114,15 +116,18 @@ class LogHandler(LogHandlerBase):
 
 
 def _describe_failure(rule: str, logs: Sequence[str]) -> str:
-    """Return the last line of the logs of a failed job. A job that was killed before it
-    wrote a line probably lacked memory."""
+    """Return the last line of the logs of a failed job.
+
+    A job that was killed before it wrote a line probably lacked memory. The log that it
+    leaves is empty, or that of an earlier run, which was successful.
+    """
     last_line = ""
     for log in logs:
         if Path(log).is_file():
             for line in Path(log).read_text(encoding="utf-8").splitlines():
                 if line.strip():
                     last_line = line
-    if last_line:
+    if last_line not in ("", _DONE):
         return last_line
     return (
         f"{rule}: found that the job was killed before it wrote its log "

@@ -56,3 +56,13 @@ def test_a_point_name_that_a_table_or_a_terminal_would_interpret_is_refused(
 ):
     with refused("a.yaml", "chain"):
         parse_chain(f"Rz(q1) Tx(1.0) [{name}]", {}, "a.yaml")
+
+
+def test_more_joints_than_an_arm_has_are_refused_before_they_fill_the_memory():
+    def write_chain(joints):
+        numbered = [f"Rz(q{number}) Tx(1)" for number in range(1, joints + 1)]
+        return " ".join([*numbered, "[A]"])
+
+    assert parse_chain(write_chain(32), {}, "test").coordinates == 32
+    with refused("test", "chain", "33 joints", "32 joints at most"):
+        parse_chain(write_chain(33), {}, "test")

@@ -50,6 +50,10 @@ def test_a_script_that_is_ended_before_it_begins_has_no_log_and_is_said_to_have_
         "from job import Job, origin_of, run\n",
         "import os\n\nos._exit(9)\n",
     )
+    # An earlier run was successful: its log says nothing of this one.
+    log = finished_paper.path("results/logs/typeset_table/table1.log")
+    log.parent.mkdir(parents=True, exist_ok=True)
+    log.write_text("done\n", encoding="utf-8")
     ended = finished_paper.snakemake("-j1", "reports/tables/table1.md")
     message = (
         "typeset_table: found that the job was killed before it wrote its log "

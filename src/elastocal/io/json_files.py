@@ -5,15 +5,25 @@ import json
 from pathlib import Path
 from typing import Any
 
+from elastocal.errors import InputError
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.texts import check_file
 
 
 def read_json(path: str | Path) -> Any:
-    """Read a JSON file."""
+    """Read a JSON file.
+
+    An InputError refuses a file that is no JSON, or whose brackets are nested so deeply
+    that no program of this project can have written it.
+    """
     check_file(path)
-    with open(path, encoding="utf-8") as file:
-        return json.load(file)
+    try:
+        with open(path, encoding="utf-8") as file:
+            return json.load(file)
+    except (ValueError, RecursionError) as error:
+        raise InputError(
+            path, "", f"no JSON ({error})", "the file as the pipeline wrote it"
+        ) from None
 
 
 def write_json(path: str | Path, contents: Any, **options: Any) -> None:

@@ -100,6 +100,6 @@ def _read_written_files(top: Path) -> dict[str, str]:
         return {}
     try:
         contents = read_json(path)
-    except (ValueError, RecursionError):
+    except InputError:
         return {}
     return contents if isinstance(contents, dict) else {}

@@ -34,6 +34,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
 AXES = "xyz"
+# Candidates grow with the square of the joints: with 40 joints `elastocal check` took
+# 1.9 GB. No arm that is calibrated has as many.
+MOST_JOINTS = 32
 # Kind and axis of the six elementary displacements of a frame: Tx Ty Tz Rx Ry Rz.
 SIX_DISPLACEMENTS = tuple((kind, axis) for kind in "TR" for axis in range(3))
 _TOKEN = re.compile(
@@ -209,8 +212,10 @@ def parse_chain(text: str, lengths_m: Mapping[str, float], source: str) -> Chain
         joints += transform.coordinate is not None
         if transform.kind == "T":
             used_lengths.add(match["argument"])
-    if not joints:
-        raise InputError(source, "chain", "no joint", "at least one R.(q1) or T.(q1)")
+    if not 1 <= joints <= MOST_JOINTS:
+        number = f"{joints} joints" if joints else "no joint"
+        allowed = f"at least one R.(q1) or T.(q1), and {MOST_JOINTS} joints at most"
+        raise InputError(source, "chain", number, allowed)
     chain = Chain(tuple(transforms), tuple(points.values()), joints)
     if not points or chain.end_effector.after != len(transforms):
         last = f"{text.split()[-1]!r} at its end"

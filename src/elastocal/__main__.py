@@ -1,0 +1,60 @@
+"""The command `elastocal`, and `python -m elastocal`: prepare the process, then run the
+application.
+
+Only the standard library is imported here. So the threads of numerical libraries are
+limited before they start, and an interrupt during the imports ends without a traceback.
+"""
+
+import ctypes
+import os
+import sys
+from contextlib import suppress
+
+# A subcommand works on small matrices, which more threads do not make faster: they only
+# wait for each other. Who wants more sets these variables.
+_THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+)
+# Parameters of glibc's mallopt, see malloc.h: with these thresholds the memory of a
+# large array is kept for the next one. Fresh pages would cost a third of the time of a
+# correction. The largest threshold that glibc accepts is half of a heap.
+_M_TRIM_THRESHOLD = -1
+_M_MMAP_THRESHOLD = -3
+_KEPT_BYTES = 2**25
+_TRIMMED_BYTES = 2**30
+# The exit code of shells for a process that was interrupted.
+_INTERRUPTED = 130
+
+
+def main() -> None:
+    """Run the application. An interrupt ends it with the exit code 130."""
+    try:
+        prepare_process()
+        from elastocal.command.main import main as run_application
+
+        run_application()
+    except KeyboardInterrupt:
+        sys.exit(_INTERRUPTED)
+
+
+def prepare_process() -> None:
+    """Limit threads to one, keep memory for the next array, and print on terminals that
+    lack a character a question mark instead of failing."""
+    for variable in _THREAD_VARIABLES:
+        os.environ.setdefault(variable, "1")
+    # Other systems than Linux have no mallopt, and no need of it.
+    with suppress(OSError, AttributeError):
+        allocator = ctypes.CDLL(None)
+        allocator.mallopt(_M_MMAP_THRESHOLD, _KEPT_BYTES)
+        allocator.mallopt(_M_TRIM_THRESHOLD, _TRIMMED_BYTES)
+    for stream in (sys.stdout, sys.stderr):
+        # A stream that a program has put in place of standard output may lack this.
+        with suppress(AttributeError):
+            stream.reconfigure(errors="replace")
+
+
+if __name__ == "__main__":
+    main()

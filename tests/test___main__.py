@@ -1,0 +1,64 @@
+"""The process of the command: threads, the terminal, and interrupts."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from elastocal.__main__ import _THREAD_VARIABLES
+
+COMMAND = [sys.executable, "-m", "elastocal"]
+
+
+def run_command(*arguments, **environment):
+    return subprocess.run(
+        [*COMMAND, *arguments],
+        env=os.environ | environment,
+        capture_output=True,
+        check=False,
+    )
+
+
+def test_a_terminal_that_lacks_a_character_gets_a_question_mark(tmp_path):
+    """The refusal quotes a name that ASCII cannot write."""
+    finished = run_command("check", f"{tmp_path}/Zelle-ä", PYTHONIOENCODING="ascii")
+    assert finished.returncode == 1
+    assert b"Zelle-?" in finished.stderr and b"Traceback" not in finished.stderr
+
+
+@pytest.mark.parametrize("delay_s", [0.15, 0.4, 1.0])
+def test_an_interrupt_ends_without_a_traceback(tmp_path, delay_s):
+    """Also during the imports, which take most of the first second."""
+    with subprocess.Popen(
+        [*COMMAND, "demo"], cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as process:
+        time.sleep(delay_s)
+        process.send_signal(signal.SIGINT)
+        output, errors = process.communicate(timeout=60)
+    assert process.returncode not in (0, 1)
+    assert b"Traceback" not in output + errors
+
+
+@pytest.mark.parametrize(("stated", "expected"), [(None, "1"), ("2", "2")])
+def test_numerical_libraries_have_one_thread_unless_the_user_says_otherwise(
+    stated, expected
+):
+    script = (
+        "import os, elastocal.__main__ as entry;"
+        "entry.prepare_process();"
+        f"print(*[os.environ[name] for name in {_THREAD_VARIABLES!r}])"
+    )
+    environment = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in _THREAD_VARIABLES
+    }
+    if stated:
+        environment |= dict.fromkeys(_THREAD_VARIABLES, stated)
+    printed = subprocess.check_output(
+        [sys.executable, "-c", script], env=environment, text=True
+    )
+    assert set(printed.split()) == {expected}
