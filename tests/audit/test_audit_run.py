@@ -17,12 +17,13 @@ from elastocal_proof.audit.audit_run import (
 )
 from elastocal_proof.audit.finished_run import Finding, FinishedRun
 
-FILE = "results/initial/two.parquet"
+# No check computes a file of this name again.
+FILE = "results/made/two.parquet"
 
 
 @pytest.fixture
 def folder(tmp_path):
-    (tmp_path / "results/initial").mkdir(parents=True)
+    (tmp_path / "results/made").mkdir(parents=True)
     return FinishedRun(tmp_path, CONFIGURATION, {"two": ROBOT}, {}, 4)
 
 

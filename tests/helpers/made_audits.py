@@ -144,6 +144,11 @@ def altered(folder, file, address, change):
             inner = inner[key]
         inner[last] = change(inner[last])
         paths[0].write_text(json.dumps(document), encoding="utf-8")
+    elif file.endswith(".csv"):
+        table = pd.read_csv(paths[0])
+        column, row = address
+        table.loc[row, column] = change(table.loc[row, column])
+        table.to_csv(paths[0], index=False)
     else:
         table = pq.ParquetFile(paths[0]).read()
         column, row = address

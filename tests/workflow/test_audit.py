@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 import yaml
 from durations import HUNG_S
-from made_audits import altered
+from made_audits import altered, failed
 
 from elastocal_proof.audit.audit_run import audit_run
 from elastocal_proof.audit.finished_run import FinishedRun
@@ -80,6 +80,49 @@ def test_a_column_multiplied_is_found_although_its_checksum_is_forged(
             for finding in audit_run(audited(folder), audited_files)
             if not finding.holds
         ]
+
+
+ONE_VALUE = [
+    ("results/weights/kuka.parquet", "count"),
+    ("results/initial/kuka.parquet", "maximum"),
+    ("results/metrics/kuka/200um/6DoF.parquet", "delta_k_3"),
+    ("results/replicates/kuka/200um/6DoF.parquet", "k_sigma"),
+    ("reports/tables/table1.csv", "compliance_2_urad_per_Nm"),
+    ("reports/tables/table2.csv", "max_mm"),
+    ("reports/tables/table3.csv", "compliance_5_urad_per_Nm_std_error"),
+    ("reports/tables/table4.csv", "k_sigma_20_percent"),
+    (f"reports/loop/{CAMPAIGN}/before_after.csv", "train_max_m"),
+    (f"reports/loop/{CAMPAIGN}/residuals.parquet", "before_dz"),
+]
+
+
+@pytest.mark.parametrize(("file", "column"), ONE_VALUE)
+def test_one_altered_value_is_found_although_its_checksum_is_forged(
+    folder, file, column
+):
+    """Residuals are found by the errors that they add up to."""
+    audited_files = {file, file.replace("residuals.parquet", "before_after.csv")}
+    row = 1 if file.endswith(".csv") else 3
+    with altered(folder, file, (column, row), lambda value: 2 * value + 1):
+        assert [
+            finding.file
+            for finding in audit_run(audited(folder), audited_files)
+            if not finding.holds
+        ]
+
+
+def test_a_digit_of_a_table_for_people_is_found(folder):
+    file = "reports/tables/table1.md"
+    path = folder / file
+    before = path.read_text("utf-8")
+    digit = next(character for character in reversed(before) if character.isdigit())
+    head, _, tail = before.rpartition(digit)
+    path.write_text(f"{head}{(int(digit) + 3) % 10}{tail}", "utf-8")
+    try:
+        findings = audit_run(audited(folder), {file})
+    finally:
+        path.write_text(before, "utf-8")
+    assert "rounded values" in failed(findings)
 
 
 def test_an_edited_robot_makes_its_files_stale(folder):

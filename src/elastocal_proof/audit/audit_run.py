@@ -18,7 +18,7 @@ from jinja2 import Environment
 
 from elastocal import __version__
 from elastocal.io.records import RECORDS, list_recorded_files
-from elastocal_proof.audit import campaigns, fits, study
+from elastocal_proof.audit import campaigns, fits, scores, study
 from elastocal_proof.audit.finished_run import Finding, FinishedRun, require
 
 _Check = Callable[..., Iterator[Finding]]
@@ -31,7 +31,9 @@ OF_EVERY_FILE = ("its record", _SHA, _METADATA)
 # Checks that compute a file again, by the pattern of its name. Names in braces are
 # arguments of the check.
 CHECKS: list[tuple[str, _Check]] = [
-    item for module in (study, campaigns, fits) for item in module.CHECKS.items()
+    item
+    for module in (study, scores, campaigns, fits)
+    for item in module.CHECKS.items()
 ]
 COLUMNS = ("file", "checked", "by", "compared", "worst", "holds", "note")
 # Findings that the page shows in full.

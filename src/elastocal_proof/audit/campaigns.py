@@ -23,6 +23,8 @@ from elastocal_proof.audit.finished_run import (
     require,
 )
 
+# Columns that are numbered anew when a campaign is read.
+_RENUMBERED = ("session", "pose", "load", "repeat", "target", "row")
 # Relative tolerance: positions are some metres and rotations some radians, and near
 # half a turn rotation vectors lose digits.
 _TOLERANCE = 1e-10
@@ -130,11 +132,16 @@ def check_split(run: FinishedRun, file: str, campaign: str) -> Iterator[Finding]
         np.arange(1, len(original) + 1),
         0.0,
     )
+    values = [
+        name
+        for name in original.select_dtypes("number").columns
+        if name in rows and name not in _RENUMBERED
+    ]
     yield compare(
-        "positions as measured",
+        "angles, loads and positions as measured",
         "the campaign's file",
-        rows[list(POSITION)],
-        original[list(POSITION)],
+        rows[values],
+        original[values],
         0.0,
     )
 
@@ -161,8 +168,14 @@ def check_seals(run: FinishedRun, file: str) -> Iterator[Finding]:
     )
 
 
+def check_held_out(run: FinishedRun, file: str, campaign: str) -> Iterator[Finding]:
+    """As the split of the fitted poses."""
+    return check_split(run, file.replace("held_out", "training"), campaign)
+
+
 CHECKS = {
     "data/campaigns/{campaign}/measurements.parquet": check_simulated_campaign,
     "results/loop/{campaign}/training.parquet": check_split,
+    "results/loop/{campaign}/held_out.parquet": check_held_out,
     "reports/blind/manifest.sha256": check_seals,
 }
