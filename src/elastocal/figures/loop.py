@@ -48,10 +48,10 @@ _VIEWS = {"from the side": [0, 2], "from above": [0, 1]}
 METRICS = {"mean": "mean", "rms": "RMS", "p95": "95th percentile", "max": "maximum"}
 # Colour and label of each kind of model.
 MODEL_STYLES = {
-    "frames": ("#b9b9b9", "frames and targets only"),
-    "declared": STAGES["before"][::-1],
+    "frames": ("#b9b9b9", "before"),
+    "declared": (PALETTE[1], "declared model"),
     "effect": STAGES["after"][::-1],
-    "kept": ("#777777", "frames and targets only, kept"),
+    "kept": ("#777777", "before, kept"),
 }
 # Above this ratio of the largest to the smallest error, the axis is logarithmic, because
 # the smallest bars would be invisible on a linear one.
@@ -108,7 +108,7 @@ _RESIDUAL_CONTRIBUTIONS = (
 TRACKER = "tracker"
 # Colour and label of each kind of contribution to an error budget.
 _CONTRIBUTION_STYLES = {
-    "uncorrected": ("#b9b9b9", "without any correction"),
+    "before": ("#b9b9b9", "before calibration"),
     "effect": (PALETTE[0], "if this alone were left out"),
     "residual": (PALETTE[2], "left after correction"),
     TRACKER: ("#ffffff", "in no robot: noise of a single measurement"),

@@ -21,7 +21,7 @@ _SHARES = {
     "declared_weight": "errors of the declared weights",
     "joint_offset": "joint offsets",
     "link_geometry": "link geometry",
-    "uncorrected": "no correction at all",
+    "before": "before calibration, as measured at validation poses",
     "form of the model": "form of the model",
     "not commanded": "effects that no command contains",
     "regression": "regression on the remainder",
