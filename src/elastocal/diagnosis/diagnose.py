@@ -25,6 +25,7 @@ from elastocal.diagnosis.fitted_subset import (
     sample_for_search,
     select_initial_subset,
 )
+from elastocal.diagnosis.grid_ends import warn_of_grid_ends
 from elastocal.diagnosis.gross_errors import (
     OutlierTest,
     describe_gross_errors,
@@ -747,6 +748,7 @@ def _contradict(
         warnings += verdict.warn_of_pose_error(
             result.steps[-1].fitted.noise, evidence.design.pose_std_error_rad
         )
+    warnings += warn_of_grid_ends(result.full_model, evidence)
     return replace(
         result,
         evidence=replace(evidence, conclusion=conclusion),
