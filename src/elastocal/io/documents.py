@@ -16,6 +16,8 @@ import yaml
 from elastocal.errors import InputError, find_text_fault, suggest_name, suggest_names
 from elastocal.io.texts import read_text
 
+# Contents of a document by its keys.
+Document = Mapping[str, Any]
 # Upper bounds on a document. They are far above what people write by hand (no schema is
 # deeper than 7), and a document within them is read in seconds whatever it holds.
 LARGEST_BYTES = 300_000

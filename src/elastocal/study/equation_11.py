@@ -35,14 +35,13 @@ from elastocal.study.simulation import (
 )
 
 if TYPE_CHECKING:
+    from elastocal.io.storage import Columns
     from elastocal.mechanics.chain import Chain
     from elastocal.study.jobs import Job
     from elastocal.study.strategies import Stage, Strategy
 
 # Columns of one block of experiments and, for each measuring point, of its deflections.
-Blocks = Iterable[
-    tuple[Mapping[str, np.ndarray], Mapping[str, Mapping[str, np.ndarray]]]
-]
+Blocks = Iterable[tuple[Columns, Mapping[str, Columns]]]
 # Above this condition number the measurements do not determine the compliances.
 # Condition numbers come from squares of singular values, so larger ones than the root
 # of the machine's precision mean nothing.
@@ -391,8 +390,8 @@ def read_measured_blocks(job: Job, joints: int, points: Iterable[str]) -> Blocks
 
 
 def pair_blocks(
-    experiments: Iterable[Mapping[str, np.ndarray]],
-    deflections: Mapping[str, Iterable[Mapping[str, np.ndarray]]],
+    experiments: Iterable[Columns],
+    deflections: Mapping[str, Iterable[Columns]],
 ) -> Blocks:
     """Pair blocks of the experiments with the blocks of each measuring point."""
     for block, *measured in zip(experiments, *deflections.values(), strict=True):
