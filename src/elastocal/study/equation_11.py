@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.io.storage import read_blocks
+from elastocal.io.storage import Columns, read_blocks
 from elastocal.mechanics.elastostatics import (
     build_regressor,
     compute_generalized_forces,
@@ -35,7 +35,6 @@ from elastocal.study.simulation import (
 )
 
 if TYPE_CHECKING:
-    from elastocal.io.storage import Columns
     from elastocal.mechanics.chain import Chain
     from elastocal.study.jobs import Job
     from elastocal.study.strategies import Stage, Strategy
