@@ -52,8 +52,8 @@ CONFIDENCE = 0.95
 # Number of simulated robots; it determines a risk of 5 % to half a percent.
 _DRAWS = 2000
 _SEED = 1
-# Squared model-form error at the worst pose over its mean square: 7 to 9 on simulated
-# robots.
+# Ratio of the squared model-form error at the worst pose to its mean square. It is 7 to
+# 9 on simulated robots.
 _WORST_OF_FORM = 9.0
 # Poses for which the errors of all simulated robots are in memory at once.
 _CHUNK = 200

@@ -90,7 +90,8 @@ def add_slugs(frame: pd.DataFrame, slugs: Mapping[str, str]) -> pd.DataFrame:
 
 
 def collect_settings(job: Job, *excluded: str) -> dict[str, Any]:
-    """Parameters of a rule, without those that every rule has and the excluded ones."""
+    """Collect the parameters of a rule, without those that every rule has and without the
+    excluded ones."""
     return {
         name: value
         for name, value in job.params.items()
