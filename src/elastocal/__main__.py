@@ -53,7 +53,7 @@ def prepare_process() -> None:
     for stream in (sys.stdout, sys.stderr):
         # A stream that a program has put in place of standard output may lack this.
         with suppress(AttributeError):
-            stream.reconfigure(errors="replace")
+            stream.reconfigure(errors="replace")  # type: ignore[union-attr]
 
 
 if __name__ == "__main__":

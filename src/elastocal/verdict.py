@@ -244,8 +244,8 @@ class ErrorSummary:
 
 
 @dataclass(frozen=True)
-class UncalibratedErrors(ErrorSummary):
-    """Errors of the robot as its file has it, with the 95 % interval of the share by
+class ErrorsBefore(ErrorSummary):
+    """Errors of the robot before its calibration, with the 95 % interval of the share by
     which the calibration lowers their RMS."""
 
     reduction_ci95: tuple[float, float]
@@ -253,7 +253,8 @@ class UncalibratedErrors(ErrorSummary):
 
 @dataclass(frozen=True)
 class BeforeAfter:
-    """Errors of the declared model and of the final one."""
+    """Errors of the robot before its calibration (`HeldOut.before`) and of the final
+    model."""
 
     before: ErrorSummary
     after: ErrorSummary
@@ -291,10 +292,11 @@ class HeldOut:
 
     Attributes
     ----------
-    uncalibrated : UncalibratedErrors
-        Errors with frames and targets alone.
-    before, after : ErrorSummary
-        Errors of the declared model and of the final one.
+    before : ErrorsBefore
+        Errors of the robot that the user has: nominal geometry, springs only if the
+        robot file states them, base and targets placed (`build_nominal_model`).
+    declared, after : ErrorSummary
+        Errors of the declared model, fitted, and of the final one.
     noise_floor_rms_m : float or None
         RMS error that the noise alone leaves; None if it is not known.
     reduction_ci95 : tuple of float
@@ -315,8 +317,8 @@ class HeldOut:
         Errors of the robot as it is corrected, the regression included.
     """
 
-    uncalibrated: UncalibratedErrors
-    before: ErrorSummary
+    before: ErrorsBefore
+    declared: ErrorSummary
     after: ErrorSummary
     noise_floor_rms_m: float | None
     reduction_ci95: tuple[float, float]
@@ -607,15 +609,6 @@ class Accuracy:
 
 
 @dataclass(frozen=True)
-class PredictedErrors:
-    """Predicted accuracy of a corrected robot, and RMS error of the uncorrected one at
-    the same poses, m."""
-
-    accuracy: Accuracy
-    uncorrected_m: float
-
-
-@dataclass(frozen=True)
 class MisplacedFrame:
     """A tool, base or link that does not sit where it was declared.
 
@@ -731,10 +724,8 @@ class Verdict(TrainingVerdict):
         Regression on the residuals; None if the campaign asks for none.
     accuracy : Accuracy or None
         Predicted accuracy of the corrected robot; None if the data are at fault.
-    uncorrected_m : float or None
-        Predicted RMS error of the uncorrected robot at the same poses.
-    physics : PredictedErrors or None
-        Of a robot that is corrected without the regression; None if there is none.
+    physics : Accuracy or None
+        The same of a robot that is corrected without the regression; None if there is none.
     misplaced : tuple of MisplacedFrame
         Frames that were declared in the wrong place.
     """
@@ -742,8 +733,7 @@ class Verdict(TrainingVerdict):
     heldout: HeldOut
     remainder: Remainder | None
     accuracy: Accuracy | None = None
-    uncorrected_m: float | None = None
-    physics: PredictedErrors | None = None
+    physics: Accuracy | None = None
     misplaced: tuple[MisplacedFrame, ...] = ()
 
 

@@ -66,7 +66,7 @@ class LogHandler(LogHandlerBase):
     needs_rulegraph = False
 
     def emit(self, record: Any) -> None:
-        """Print what a record says, if anything."""
+        """Print the message of a record if it has one."""
         if self.common_settings.dryrun or self.common_settings.verbose:
             lines = self._lines_of_snakemake(record)
         else:

@@ -39,5 +39,5 @@ def test_a_bound_is_stated_if_there_is_one():
 
 
 def test_no_errors_are_tabulated_if_the_data_are_at_fault():
-    verdict = SimpleNamespace(accuracy=None, uncorrected_m=None)
+    verdict = SimpleNamespace(accuracy=None)
     assert tabulate_errors(verdict) == []

@@ -106,12 +106,12 @@ BYTES = Finding(
 
 def test_the_page_states_whether_all_checks_hold_and_which_files_were_not_recomputed():
     again, apart = render_page(tabulate_findings([GOOD, BYTES]), {"seed": "1"}).split(
-        "What was not worked out again"
+        "Files that were not recomputed"
     )
-    assert "All 2 checks hold." in again and "What does not hold" not in again
+    assert "All 2 checks hold." in again and "Failed checks" not in again
     assert (
         "results/identified/*/*um/*.parquet" in again
-        and "In <strong>1 files</strong>" in again
+        and "values of <strong>1 files</strong>" in again
     )
     assert "reports/figures/*.pdf" in apart and "reports/figures/*.pdf" not in again
     assert all(check.__doc__ for _, check in CHECKS)
@@ -122,4 +122,4 @@ def test_the_page_states_whether_all_checks_hold_and_which_files_were_not_recomp
         and "column &lt;dev&gt;" in text
         and "http" not in text
     )
-    assert "What was not worked out again" not in text
+    assert "Files that were not recomputed" not in text

@@ -74,7 +74,7 @@ def test_the_oracle_fits_what_the_diagnosis_names_rightly(tmp_path):
     assert informed["heldout"] == pytest.approx(verdict["heldout"]["after"], rel=2e-3)
     # Without an effect the oracle has the declared model.
     without_effect = fit_oracle({"defects": []}, verdict, folder, ROBOTS.as_posix(), 1)
-    assert without_effect["heldout"] == verdict["heldout"]["before"]
+    assert without_effect["heldout"] == verdict["heldout"]["declared"]
     assert not without_effect["detected"]
 
 

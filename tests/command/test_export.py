@@ -47,7 +47,7 @@ def test_an_export_says_how_much_is_lost_without_the_regression(
         answer,
     )
     assert loss and 0.1 < float(loss[2]) < float(loss[1]) < 1.0
-    by_physics_m = verdict["physics"]["accuracy"]["rms_m"]
+    by_physics_m = verdict["physics"]["rms_m"]
     assert f": {1e3 * by_physics_m:.3f} mm (" in answer
 
 

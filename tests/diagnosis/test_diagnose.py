@@ -187,8 +187,8 @@ def test_frames_alone_are_kept_if_they_predict_left_out_poses_better(
         for warning in diagnosis.document["warnings"]
     )
     heldout = judge(diagnosis, held_out, 1).document["heldout"]
-    uncalibrated_m = heldout["uncalibrated"]["rms_m"]
-    assert heldout["after"]["rms_m"] == pytest.approx(uncalibrated_m, rel=1e-3)
+    before_m = heldout["before"]["rms_m"]
+    assert heldout["after"]["rms_m"] == pytest.approx(before_m, rel=1e-3)
     enough_numbers = replace(settings, numbers_a_parameter=0.0)
     assert diagnose(case, enough_numbers, 1).document["kept"] != "frames"
 
@@ -214,7 +214,7 @@ def test_an_effect_that_is_not_expected_to_help_is_named_and_not_adopted(
     noise = document["noise"]
     assert noise["factor"] == diagnosis.declared.noise.position_m / noise["position_m"]
     verdict = judge(diagnosis, cases[1], 1).document
-    assert verdict["heldout"]["before"] == verdict["heldout"]["after"]
+    assert verdict["heldout"]["declared"] == verdict["heldout"]["after"]
     assert verdict["effects"][0]["heldout_gain"] is None
     # The next experiment can be planned, too.
     _, experiment = propose_experiment(diagnosis, np.random.default_rng(0))

@@ -15,6 +15,7 @@ from elastocal.diagnosis.evidence import (
     SizeGrid,
     compute_pose_error_log_prior,
     evaluate_model,
+    list_pose_errors,
     log_likelihood,
 )
 from elastocal.diagnosis.settings import Settings
@@ -203,3 +204,23 @@ def test_moments_have_the_noise_that_a_model_leaves_if_that_is_more_than_was_ass
     np.testing.assert_allclose(
         variance, noise_variance * np.diag(np.linalg.inv(precision))
     )
+
+
+@pytest.mark.parametrize("std_error_rad", [1e-7, 1e-5, 1e-3])
+def test_the_grid_of_the_pose_error_reaches_beyond_what_physics_allows(std_error_rad):
+    sizes = list_pose_errors(std_error_rad, SETTINGS)
+    assert sizes[0] == 0.0
+    assert sizes[-1] >= 2.0 * SETTINGS.largest_pose_error_rad
+    assert sizes[-1] >= 16.0 * std_error_rad
+    assert (sizes[2:] / sizes[1:-1]).max() <= 2.0 + 1e-9
+
+
+def test_pose_errors_have_a_half_cauchy_prior_beside_their_absence():
+    sizes = np.array([0.0, 1.0, 2.0, 20.0]) * SETTINGS.pose_repeatability_rad
+    prior = np.exp(compute_pose_error_log_prior(sizes, SETTINGS))
+    assert prior.sum() == pytest.approx(1.0)
+    assert prior[0] == pytest.approx(1.0 - SETTINGS.pose_error_probability)
+    # Densities in the logarithm of the size: x / (1 + x^2).
+    assert prior[1] / prior[3] == pytest.approx((1 / 2) / (20 / 401))
+    alone = compute_pose_error_log_prior(np.zeros(1), SETTINGS)
+    assert alone == pytest.approx(np.log(1.0 - SETTINGS.pose_error_probability))

@@ -255,7 +255,7 @@ def test_the_budget_has_a_bar_for_each_line_that_is_not_zero_the_largest_first_f
     figure = draw_budget_bars(budget, [line["name"] for line in budget], 2e-4, 1.5e-4)
     axis = figure.axes[0]
     assert row_labels(axis) == [
-        "uncorrected",
+        "before",
         "joint_compliance",
         "lost_motion",
         "noise of the tracker alone",

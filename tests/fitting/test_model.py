@@ -19,10 +19,12 @@ from synthetic import (
 
 from elastocal.campaigns.campaign import Campaign, Target, tabulate_measurements
 from elastocal.effects.catalogue import candidates_on
+from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import (
     apply_step,
     build_case,
     build_declared_model,
+    build_nominal_model,
     compute_residuals,
     evaluate_conditions,
     find_nonlinear_parameters,
@@ -30,6 +32,8 @@ from elastocal.fitting.model import (
     list_parameters,
     predict,
 )
+from elastocal.fitting.noise import Noise
+from elastocal.fitting.observations import separate_measurements
 from elastocal.io.documents import read_document
 from elastocal.mechanics.elastostatics import (
     compute_exact_deflections,
@@ -37,6 +41,7 @@ from elastocal.mechanics.elastostatics import (
 )
 from elastocal.mechanics.kinematics import compute_poses
 
+NOISE = Noise("declared", 6e-5, 6e-5, np.zeros(6))
 TWO_TARGETS = Target("A", "6DoF", None), Target("B", "3DoF", (0.1, 0.0, -0.2))
 
 
@@ -88,6 +93,38 @@ def test_a_model_of_rigid_joints_states_that_compliances_are_unknown(
     assert not elastic.compliance_known
     assert (elastic.nominal_compliance > 0).all()
     assert elastic.sites.masses
+
+
+def test_before_is_the_error_of_the_rigid_robot_if_the_file_has_masses_and_no_springs(
+    kuka, config_folder
+):
+    """Distances of the measurements from the file's kinematics are the true errors,
+    because the campaign declares the base and the targets."""
+    campaign = make_campaign(kuka, 1, Plan(poses=5, loads=1, oriented=False))
+    targets = {f"T{name}": {"point": name, "offset_m": [0, 0, 0]} for name in POINTS}
+    document = describe_case(
+        campaign, config_folder, compliance="identify", targets=targets
+    )
+    del document["robot"]["compliance_urad_per_Nm"]
+    document["robot"]["masses"] = [
+        {"link": 2, "mass_kg": 400, "centre_m": [0.5, 0, 0], "relative_std": 0.2}
+    ]
+    measured = campaign.measurements
+    case = build_case(document, tabulate_measurements(measured))
+    observations = separate_measurements(measured)
+    fitted = fit_model(build_nominal_model(case.model), observations, NOISE)
+    expected = np.empty_like(measured.position)
+    for number, name in enumerate(POINTS):
+        rows = measured.target == number
+        point = kuka.chain.point(name)
+        expected[rows] = compute_poses(kuka.chain, measured.joint_angles[rows], point)[
+            0
+        ]
+    np.testing.assert_allclose(
+        fitted.residual, measured.position - expected, rtol=0, atol=1e-12
+    )
+    sagging = fit_model(replace(case.model, effects=()), observations, NOISE)
+    assert np.abs(sagging.residual - fitted.residual).max() > 1e-4
 
 
 @pytest.mark.parametrize(

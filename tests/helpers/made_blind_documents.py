@@ -89,7 +89,7 @@ def make_verdict(
         "verdict": kind,
         "effects": list(effects),
         "heldout": {
-            "before": {"rms_m": before},
+            "declared": {"rms_m": before},
             "after": {"rms_m": after},
             "noise_floor_rms_m": 1e-4,
             "reduction_ci95": list(reduction),

@@ -204,9 +204,10 @@ def make_verdict(
     """Make a verdict with synthetic errors."""
     is_faulty = any(isinstance(effect, DataFault) for effect in effects)
     is_adopted = any(effect.adopted for effect in effects)
-    before = DATA["errors"]
+    declared = DATA["errors"]
     factor = 0.7 if is_adopted else 1.0
-    after = {name: factor * value for name, value in before.items()}
+    before = {name: value / 0.7 for name, value in declared.items()}
+    after = {name: factor * value for name, value in declared.items()}
     both = {"before": before, "after": after}
     document = deepcopy(DATA["verdict"]) | {
         "campaign": "made_up",
@@ -226,8 +227,9 @@ def make_verdict(
         "degrees_of_freedom": 1008 if noise == "repeats" else 0,
     }
     heldout = document["heldout"]
-    heldout |= both | {"delivered": remainder["errors"] if remainder else after}
-    heldout["uncalibrated"] |= {name: value / 0.7 for name, value in before.items()}
+    heldout |= {"declared": declared, "after": after}
+    heldout["delivered"] = remainder["errors"] if remainder else after
+    heldout["before"] |= before
     heldout |= {
         "reduction_ci95": list(reduction) if is_adopted else [0.0, 0.0],
         "reduction_std_error": 0.04 if is_adopted else 0.0,

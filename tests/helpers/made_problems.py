@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from elastocal.diagnosis.discrepancy import OWN, Discrepancy
+from elastocal.diagnosis.evidence import list_pose_errors
 from elastocal.diagnosis.hypotheses import OTHER, ModelTerm
 from elastocal.diagnosis.search import SearchProblem
 from elastocal.diagnosis.settings import Settings
@@ -160,7 +161,7 @@ def make_problem(rows, units, settings=None, tau=None):
             np.median(np.bincount(rows.pose, (rows.jacobian**2).sum(axis=1)))
             / rows.jacobian.shape[1]
         )
-        tau = np.array(settings.pose_steps) / np.sqrt(information)
+        tau = list_pose_errors(1.0 / np.sqrt(information), settings)
     tau = np.asarray(tau, float)
     return SearchProblem(
         compute_statistics(products, tau), tuple(units), settings

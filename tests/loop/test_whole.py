@@ -96,7 +96,7 @@ def test_the_loop_reaches_each_kind_of_verdict(kind, kuka, tmp_path):
     alarmed = probabilities["alarm_p_value"] <= Settings().alarm_level
     assert alarmed == (kind not in ("adequate", "not_testable"))
     if verdict["effects"]:
-        assert heldout["after"]["rms_m"] < 0.7 * heldout["before"]["rms_m"]
+        assert heldout["after"]["rms_m"] < 0.7 * heldout["declared"]["rms_m"]
         (effect,) = (
             entry for entry in verdict["effects"] if entry["name"] == "joint_offset"
         )
@@ -104,7 +104,7 @@ def test_the_loop_reaches_each_kind_of_verdict(kind, kuka, tmp_path):
         (parameter,) = effect["parameters"]
         assert parameter["value"] == pytest.approx(5e-4, abs=4 * parameter["std_error"])
     else:
-        assert heldout["after"] == heldout["before"]
+        assert heldout["after"] == heldout["declared"]
 
 
 def test_a_fault_of_the_data_is_named_without_a_statement_on_the_model(kuka, tmp_path):
@@ -184,5 +184,5 @@ def test_a_calibration_by_few_poses_is_no_worse_than_none(tmp_path):
         heldout = judge(diagnose(training, Settings(), 1), held_out, 1).document[
             "heldout"
         ]
-        ratios.append(heldout["after"]["rms_m"] / heldout["uncalibrated"]["rms_m"])
+        ratios.append(heldout["after"]["rms_m"] / heldout["before"]["rms_m"])
     assert np.exp(np.log(ratios).mean()) < 1.03

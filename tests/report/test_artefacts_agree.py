@@ -62,7 +62,7 @@ def test_artefacts_of_every_verdict_agree(
     faulty = bool(verdict.faults)
     errors = verdict.heldout
     stages = [
-        "uncalibrated",
+        "before",
         *(["after"] if errors.delivered != errors.after else []),
         "delivered",
     ]

@@ -16,6 +16,8 @@ from typer.testing import CliRunner
 from elastocal.command.main import app
 from elastocal.command.terminal import load_diagnosed_campaign
 from elastocal.errors import InputError
+from elastocal.report.outcome import describe_outcome
+from elastocal.report.words import format_millimetres
 
 CELL = "cells/made"
 OWN = ("diagnose", "--config", f"campaign={CELL}")
@@ -77,7 +79,7 @@ def test_verdict_has_every_key_of_the_contract(diagnosed):
         "outside_range",
     } <= set(heldout)
     assert heldout["after"]["rms_m"] < min(
-        heldout["before"]["rms_m"], verdict["uncorrected_m"]
+        heldout["before"]["rms_m"], heldout["declared"]["rms_m"]
     )
     assert set(map(len, verdict["compliance_urad_per_Nm"].values())) == {6}
     assert (
@@ -99,6 +101,40 @@ def test_verdict_has_every_key_of_the_contract(diagnosed):
         parameter["unit"] == "rad"
         and abs(parameter["value"] - OFFSET) < 5 * parameter["std_error"]
     )
+
+
+def test_the_error_before_is_one_number_in_all_five_places(cell, monkeypatch):
+    """Terminal, report, table behind the README, 3-D view and certificate."""
+    monkeypatch.chdir(cell.folder)
+    CliRunner().invoke(app, ["certificate", CELL, "--tolerance", "0.5mm"])
+    before_mm = (
+        1e3
+        * json.loads(report(cell, "verdict.json").read_text())["heldout"]["before"][
+            "rms_m"
+        ]
+    )
+    terminal = " ".join(describe_outcome(["reports/loop/made/report.pdf"]))
+    printed = format_millimetres(1e-3 * before_mm)
+    assert f" {printed} → " in terminal
+    page = report(cell, "report.html").read_text(encoding="utf-8")
+    assert f'<span class="from">{printed}</span>' in page
+    table = pd.read_csv(report(cell, "before_after.csv"))
+    assert 1e3 * table["heldout_rms_m"][0] == pytest.approx(before_mm)
+    drawn = json.loads(
+        page.partition('<script type="application/json"')[2]
+        .partition(">")[2]
+        .partition("</script>")[0]
+    )
+    residuals = pq.read_table(report(cell, "residuals.parquet")).to_pandas()
+    kept = residuals[~residuals["gross_error"]].reset_index(drop=True)
+    kept[["x", "y", "z"]] = 1e-3 * np.array(drawn["before"])
+    states = kept[kept["held_out"]].groupby(["pose", "load", "target"])
+    errors_mm = np.linalg.norm(states[["x", "y", "z"]].mean(), axis=1)
+    assert np.sqrt((errors_mm**2).mean()) == pytest.approx(before_mm, rel=1e-3)
+    certificate = json.loads(report(cell, "certificate.json").read_text())
+    assert certificate["errors"][0][1] == f"{before_mm:.3f} mm"
+    assert certificate["errors"][1][1] == ""
+    assert 1e3 * certificate["budget"][0]["rms_m"] == pytest.approx(before_mm)
 
 
 # What each needs besides a campaign, and would write.

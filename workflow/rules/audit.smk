@@ -1,7 +1,7 @@
-"""The audit: samples of every file of a finished run worked out again by libraries that share no code with the pipeline.
+"""The audit: recompute samples of every file of a finished run with libraries that share no code with the pipeline.
 
-`make audit` makes what `make paper` makes and is not there yet, then writes reports/audit.html and reports/audit.csv, and, where all checks
-hold, reports/audit.txt; where one does not, it ends with an error. Files of other targets, such as blind, are audited where they are.
+`make audit` first makes what `make paper` makes, if it is missing, then writes reports/audit.html and reports/audit.csv. If all checks
+hold, it also writes reports/audit.txt; otherwise it ends with an error. Finished files of other targets, such as blind, are audited too.
 """
 
 # Targets that are audited too if they have finished, with the last file of each.

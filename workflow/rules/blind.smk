@@ -1,8 +1,8 @@
-"""The blind proof: sealed cases on an independent plant, diagnosed without their ground truths, scored with them.
+"""The blind benchmark: sealed cases on an independent simulated robot, diagnosed without their ground truths and scored with them.
 
-`snakemake -j2 blind` makes the size quick; `--config blind=full` the whole; cases, sizes and targets stand in config/blind.yaml. Writes
-data/blind/, data/sealed/, results/blind/ and reports/blind/. What is sealed is read by seal_cases and, after the diagnosis, by
-oracle_cases and score_cases. diagnose_cases, the analyst, runs in processes of its own, which get campaigns alone.
+`snakemake -j2 blind` runs the size quick, `--config blind=full` the full size; config/blind.yaml has the cases, sizes and targets.
+Writes data/blind/, data/sealed/, results/blind/ and reports/blind/. Only seal_cases and, after the diagnosis, oracle_cases and
+score_cases read the sealed ground truths. diagnose_cases, the analyst, runs in separate processes that receive only the campaigns.
 """
 
 from elastocal.io.documents import read_document
@@ -11,7 +11,7 @@ PLAN = read_document(f"{CONFIG}/blind.yaml")
 if config["blind"] not in PLAN["sizes"]:
     sys.exit(f"config.yaml: blind: found {config['blind']!r}; allowed: {', '.join(PLAN['sizes'])}")
 BLIND_SIZE = PLAN["sizes"][config["blind"]]
-# All that the cases follow from: another target or another size makes none anew.
+# Everything that determines the cases. Other targets and other sizes are left out, so that changing them makes no case again.
 CASES = {key: PLAN[key] for key in ("tuned", "absent", "settings", "limit")} | {
     "sizes": {config["blind"]: BLIND_SIZE}
 }
@@ -166,7 +166,7 @@ rule write_blind_page:
 
 
 rule blind_pictures:
-    """Pictures and the table of docs/, from a finished proof."""
+    """Pictures and the table of docs/, from a finished benchmark."""
     input:
         sources=[
             rules.write_blind_page.output.page,

@@ -1,7 +1,7 @@
-"""The loop closed on the plant: measured, diagnosed, commanded by the result and measured again.
+"""The closed loop: a simulated robot is measured, diagnosed, commanded with the corrected targets and measured again.
 
-`snakemake -j2 closed_loop`. Writes results/closed_loop/{robot}.parquet, every commanded pose, and reports/closed_loop/, with
-coverage.csv: how often the accuracy that is stated of a corrected robot is that of the plant, for a known and an unknown base.
+`snakemake -j2 closed_loop`. Writes results/closed_loop/{robot}.parquet with every commanded pose, and reports/closed_loop/.
+coverage.csv there compares the stated accuracy of a corrected robot with its true accuracy, for a known and an unknown base.
 """
 
 CLOSED_LOOP = config["closed_loop"]

@@ -1,4 +1,4 @@
-"""Figures: the paper's, and those that show what its metric hides.
+"""Figures: those of the paper, and those that show what its metric hides.
 
 Needs results/ and reports/tables/. Writes reports/figures/*.pdf and *.png.
 """

@@ -1,4 +1,4 @@
-"""Estimates and their scores: each strategy on each robot at each noise level, its own job.
+"""Estimates and their scores: one job for each strategy, robot and noise level.
 
 Needs data/simulated/. Writes results/weights/{robot}.parquet, results/identified/, results/metrics/ and results/replicates/, each
 {robot}/{noise}um/{strategy}.parquet.

@@ -1,8 +1,8 @@
-"""The league: every method on every public data set, by the same folds.
+"""The benchmark of methods: every method predicts the same held-out poses of every public data set.
 
-`snakemake -j2 league`; `league_small` does the same on the two smallest data sets. Needs data/campaigns/{data}/, which are imported;
-where ELASTOCAL_DATA names a folder, data sets of which it lacks a file are left out, and named. Writes results/league/{data}/ and
-reports/league/{league}/.
+`snakemake -j2 league`; `league_small` uses only the two smallest data sets. Needs data/campaigns/{data}/, which are imported. If
+ELASTOCAL_DATA names a folder, data sets that lack a file there are left out, and the page names them. Writes results/league/{data}/
+and reports/league/{league}/.
 """
 
 
@@ -121,7 +121,7 @@ rule league:
 
 
 rule league_pictures:
-    """Pictures and tables of docs/, from a finished league."""
+    """Pictures and tables of docs/, from a finished benchmark of methods."""
     input:
         league="reports/league/all/league.png",
         mechanisms="reports/league/all/mechanisms.png",
@@ -131,7 +131,7 @@ rule league_pictures:
         mechanisms="docs/mechanisms.png",
         page="docs/league_tables.md",
     params:
-        head="# Tables of the league\n\nWritten by `snakemake -j2 league`; [what they mean](league.md).\n\n"
+        head="# Tables of the benchmark of methods\n\nWritten by `snakemake -j2 league`; [what they mean](league.md).\n\n"
         "![RMS errors of all methods over that of geometry](league.png)\n\n",
     shell:
         "(cp {input.league} {output.league}; cp {input.mechanisms} {output.mechanisms};"

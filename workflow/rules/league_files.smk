@@ -1,4 +1,4 @@
-"""Available data sets of the league, and the names of its files: functions for league.smk."""
+"""Functions for league.smk: available data sets of the benchmark of methods, and the names of its files."""
 
 from elastocal.campaigns.importers import find_importer, find_missing
 
@@ -24,7 +24,7 @@ MISSING_DATA = missing_data(list_league_data(config))
 
 
 def available_data(robots):
-    """Return the robots of a league with their available data sets; a robot without any is left out."""
+    """Return the robots of a benchmark with their available data sets; a robot without any is left out."""
     available = {
         robot: [name for name in names if name not in MISSING_DATA]
         for robot, names in robots.items()
@@ -36,13 +36,13 @@ LEAGUES = {league: available_data(robots) for league, robots in LEAGUE["data"].i
 
 
 def missing_of(league):
-    """Return the data sets that a league leaves out, with a missing file of each."""
+    """Return the data sets that a benchmark leaves out, with a missing file of each."""
     named = {name for names in LEAGUE["data"][league].values() for name in names}
     return {name: file for name, file in MISSING_DATA.items() if name in named}
 
 
 def sessions_of(data):
-    """Return the other data sets of the same robot, in any league."""
+    """Return the other data sets of the same robot, in any benchmark."""
     robots = [names for league in LEAGUES.values() for names in league.values() if data in names]
     return list(dict.fromkeys(name for names in robots for name in names if name != data))
 

@@ -1,4 +1,4 @@
-"""Closing the loop on a campaign: measurements, noise, declared model, missing effects, held-out errors, verdict, report.
+"""The loop of a campaign: measurements, noise, declared model, missing effects, held-out errors, verdict, report.
 
 Needs a campaign's folder: the user's own, or data/campaigns/{campaign}/, which is simulated or imported from public data. Writes
 results/loop/{campaign}/, a table for each step, and reports/loop/{campaign}/. No step before judge_campaign reads held-out poses.

@@ -1,7 +1,7 @@
-"""What the loop shows of a campaign: figures of its residuals, candidates and errors, and the report for whoever asked for it.
+"""The report of a campaign: figures of its residuals, candidates and errors, and the documents for its user.
 
 Needs results/loop/{campaign}/ and the tables of reports/loop/{campaign}/. Writes reports/loop/{campaign}/figures/*.pdf and *.png,
-reports/loop/{campaign}/report.pdf and report.html, and, of the study too, the pictures of the README.
+reports/loop/{campaign}/report.pdf and report.html. It also copies the pictures of the README, including those of the study.
 """
 
 # The campaign whose pictures the README shows.
@@ -80,8 +80,8 @@ rule draw_hero:
         "../scripts/draw_hero.py"
 
 
-# Copies in docs of what a finished run made, by the name of the copy: pictures of the
-# pages, and the tables that the figures of the pages are compared with.
+# Files of a finished run by the names of their copies in docs: the pictures of the
+# pages, and the tables with which tests compare the numbers on the pages.
 COPIES_IN_DOCS = (
     {f"docs/{figure}.png": f"reports/figures/{figure}.png" for figure in FIGURES}
     | {
@@ -109,7 +109,7 @@ rule copy_into_docs:
         "../scripts/copy_into_docs.py"
 
 
-# Everything in docs that a run of the study and of the two campaigns makes.
+# All files in docs that come from the study and the two campaigns.
 rule pictures:
     input:
         rules.copy_into_docs.output.copies,

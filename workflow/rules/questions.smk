@@ -1,9 +1,9 @@
 """Research questions beyond the paper's tables: how many springs (RQ1), which points (RQ2), which configurations (RQ3), which
 metric (RQ4).
 
-Needs the configuration alone, because the data sets are those of the study, drawn again in memory; tabulate_uses also needs
+Needs only the configuration, because the data sets of the study are drawn again in memory; tabulate_uses also needs
 results/metrics/ and results/replicates/. Writes results/budget/, results/ladder/, results/simulated_designs/ and results/uses/, each
-{robot}.parquet, and from each the tables of the same names in reports/tables/.
+with {robot}.parquet, and the tables of the same names in reports/tables/.
 """
 
 QUESTIONS = config["questions"]

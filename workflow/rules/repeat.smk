@@ -1,6 +1,6 @@
-"""Repeated studies: how much two studies of the same size differ, and Table 4 over all of them.
+"""Repeated studies: how much studies of the same size differ, and Table 4 over all of them.
 
-Needs the configuration alone. Writes results/studies/{robot}.parquet and reports/tables/strategies_over_studies.csv.
+Needs only the configuration. Writes results/studies/{robot}.parquet and reports/tables/strategies_over_studies.csv.
 """
 
 

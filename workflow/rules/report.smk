@@ -1,7 +1,7 @@
-"""The reports: the paper's tables and figures, and the study's: numbers for its text, then its pages.
+"""The reports: the paper's tables and figures, and the study with the numbers of its text.
 
-Needs reports/tables/ and reports/figures/. Writes reports/paper.pdf, reports/answers.json and reports/study.pdf; of the
-documentation, docs/study_tables.md.
+Needs reports/tables/ and reports/figures/. Writes reports/paper.pdf, reports/answers.json, reports/study.pdf and
+docs/study_tables.md.
 """
 
 # Loads and sizes that the text of the report states.

@@ -1,4 +1,4 @@
-"""Pictures of the catalogue: what each effect does to a measured point, for the site.
+"""Pictures of the catalogue for the site: how each effect displaces a measured point.
 
 `snakemake -j1 signatures`. Writes reports/figures/signatures/EFFECT.svg.
 """
@@ -6,7 +6,7 @@
 
 rule draw_signatures:
     input:
-        # It has a compensator and a rated load, without which some effects are not offered.
+        # This robot has a compensator and a rated load, which some effects need.
         robot=f"{CONFIG}/robots/gp180.yaml",
     output:
         figures=directory("reports/figures/signatures"),

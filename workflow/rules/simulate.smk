@@ -1,7 +1,7 @@
-"""Data: random experiments of each robot, their deflections, and these with noise.
+"""Data: random experiments of each robot, and their deflections without and with noise.
 
-Needs nothing but the configuration. Writes data/simulated/{robot}/: experiments.parquet and ideal.parquet, the same in test/ for
-the configurations that judge, and {noise}um/measured.parquet.
+Needs only the configuration. Writes to data/simulated/{robot}/: experiments.parquet and ideal.parquet, the same two in test/ for
+the test configurations, and {noise}um/measured.parquet.
 """
 
 

@@ -1,6 +1,6 @@
-"""Tables: the paper's, those beside them, and the comparison with the printed figures.
+"""Tables: those of the paper, further ones, and the comparison with the printed figures.
 
-Needs results/. Writes reports/tables/*.csv and, for the paper's tables, the same as Markdown and LaTeX.
+Needs results/. Writes reports/tables/*.csv; the tables of the paper also as Markdown and LaTeX.
 """
 
 PRINTED_FIGURES = f"{CONFIG}/paper/reference.csv"

@@ -25,7 +25,6 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from elastocal.application.calibrated import (
-    compute_nominal_poses,
     compute_pose_sensitivities,
     factor_covariance,
     predict_poses,
@@ -38,7 +37,7 @@ from elastocal.application.frames import (
     root_mean_square,
 )
 from elastocal.application.scope import set_form_error
-from elastocal.mechanics.kinematics import compute_jacobians, compute_pose_differences
+from elastocal.mechanics.kinematics import compute_jacobians
 from elastocal.verdict import Accuracy
 
 if TYPE_CHECKING:
@@ -53,8 +52,8 @@ CONFIDENCE = 0.95
 # Number of simulated robots; it determines a risk of 5 % to half a percent.
 _DRAWS = 2000
 _SEED = 1
-# Squared model-form error at the worst pose over its mean square: 7 to 9 on simulated
-# robots.
+# Ratio of the squared model-form error at the worst pose to its mean square. It is 7 to
+# 9 on simulated robots.
 _WORST_OF_FORM = 9.0
 # Poses for which the errors of all simulated robots are in memory at once.
 _CHUNK = 200
@@ -378,19 +377,6 @@ def compute_uncorrected_errors_m(
     columns = compute_placement_columns(scope, position, rotation)
     errors = differences - columns @ scope.absorbed_before
     return np.linalg.norm(errors[:, :3], axis=1)
-
-
-def compute_uncorrected_rms_m(
-    calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray
-) -> float:
-    """Compute the RMS error of the uncorrected robot at commands (N, n) under loads
-    (N, 6), m, in the frame of the corrected one."""
-    pose = predict_poses(calibrated, reported_angles, wrench)
-    nominal_pose = compute_nominal_poses(calibrated.robot, reported_angles)
-    differences = compute_pose_differences(*nominal_pose, *pose)
-    return root_mean_square(
-        compute_uncorrected_errors_m(calibrated, *pose, differences)
-    )
 
 
 def select_campaign_commands(

@@ -256,7 +256,7 @@ def _correct_chunk(calibrated: CalibratedRobot, targets: _NominalTargets) -> Cor
     )
     angles = targets.angles.copy()
     is_singular = np.zeros(len(angles), bool)
-    # Rows that need another step: near singular postures more than elsewhere.
+    # Only these rows need another step. Most of them are near singular postures.
     rows = np.flatnonzero(targets.is_reached)
     for iteration in range(_STEPS):
         step = (inverse[rows] @ current.error[rows, :, None])[..., 0]

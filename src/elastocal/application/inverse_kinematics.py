@@ -55,8 +55,8 @@ _STARTS = 12
 # rotation, too. A change of posture or of turns is far larger than both.
 STEP_PER_TURN = 5.0
 STEP_ALLOWANCE = np.radians(10.0)
-# Copies of a solution whole turns away that are candidates: those within two turns
-# either way of the middle of the limits.
+# Copies of a solution that differ by whole turns are candidates too, within two turns
+# of the middle of the limits.
 _MOST_TURNS = 4
 # Weights of the path's cost beside its length: the excess of steps that are too large
 # comes first, the distance from the middle of the limits last.
@@ -214,8 +214,8 @@ class _Solutions:
 def solve_path(
     robot: Robot, position: np.ndarray, rotation: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Solve for joint angles along a path, within the limits if possible, that move as
-    little as possible.
+    """Solve for the joint angles along a path that move the joints as little as possible,
+    within their limits if this can be done.
 
     Parameters
     ----------

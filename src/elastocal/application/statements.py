@@ -69,7 +69,8 @@ def tabulate_errors(verdict: Verdict) -> list[list[str]]:
     """Tabulate the errors before and after the correction for report and certificate.
 
     Measured and predicted errors, over different poses and in different frames, are
-    different quantities; each row says which one it states.
+    different quantities; each row says which one it states. The error before is the
+    measured one alone, so that it has one value everywhere (`HeldOut.before`).
 
     Parameters
     ----------
@@ -77,21 +78,21 @@ def tabulate_errors(verdict: Verdict) -> list[list[str]]:
 
     Returns
     -------
-    Rows of three cells: name of the RMS error, its value for the uncorrected robot, and
-    its value for the corrected one. No rows if the data are at fault.
+    Rows of three cells: name of the RMS error, its value before the correction, and
+    after it. No rows if the data are at fault.
     """
     accuracy = verdict.accuracy
-    if accuracy is None or verdict.uncorrected_m is None:
+    if accuracy is None:
         return []
     measured = [
         "measured at validation poses, noise included,"
         " after the best placement of the base",
-        format_millimetres(verdict.heldout.uncalibrated.rms_m),
+        format_millimetres(verdict.heldout.before.rms_m),
         format_millimetres(verdict.heldout.delivered.rms_m),
     ]
     predicted = [
         f"predicted over {accuracy.region}, {FRAMES[accuracy.frame]}",
-        format_millimetres(verdict.uncorrected_m),
+        "",
         format_millimetres(accuracy.rms_m),
     ]
     return [measured, predicted]

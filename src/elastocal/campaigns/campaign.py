@@ -291,8 +291,8 @@ def tabulate_residuals(
     measurements : N measurements.
     outside : (N,) bool array, whether each is outside the range of the fitted poses.
     position : (N, 3) m, base axes.
-    stages : (N, rows) residuals "before", of the declared model, and "after", of the
-        final one; m and rad.
+    stages : (N, rows) residuals "before", of the robot as its file has it, and "after", of
+        the final model; m and rad.
     held_out : whether the measurements are held out.
     gross_errors : whether they are gross errors.
     """

@@ -18,9 +18,9 @@ from elastocal.campaigns.tables import HEADER_WITHOUT_ROWS, Cells, read_text_tab
 from elastocal.counting import format_count
 from elastocal.errors import InputError, suggest_names
 from elastocal.io.atomic_writes import write_atomically
-from elastocal.io.storage import Column
+from elastocal.io.storage import Column, read_schemas
 from elastocal.io.texts import describe_file_kind
-from elastocal.mechanics.components import WRENCH, WRENCH_NAMES
+from elastocal.mechanics.components import WRENCH_NAMES
 
 # Upper bounds on a file. The diagnosis of a million measurements takes 2 GB (see
 # benchmarks); a tracker's stream is averaged before it is written to a file.
@@ -44,43 +44,13 @@ DISPLAY_TOLERANCE = 2e-3
 # A turn and a half. No rotation vector is longer, and no joint of a serial arm reports
 # more, unless its limits are wider.
 LARGEST_ROTATION_RAD = 3.0 * np.pi
+_SCHEMA = read_schemas(__file__)["measurements"]
 
 
 def describe_columns(joints: int) -> dict[str, Column]:
     """Return every column that a file of measurements may have, by its name."""
-    numbers = range(1, joints + 1)
-    session = "sessions have each their own tracker frame; 0 throughout where absent"
-    repeat = "number of the fresh approach to this pose and load"
-    u95 = "expanded uncertainty of this position: 95 % of one coordinate"
-    angle = "angle of joint {} as the controller reports it"
-    approach = "sense of approach of joint {}: -1, 0, +1"
-    columns = [
-        ("session", "int32", "", session),
-        ("pose", "int32", "", "number of the pose in its session"),
-        ("load", "int32", "", "number of the load, 0 where unloaded"),
-        ("repeat", "int32", "", repeat),
-        ("target", "string", "", "name of the target that was read"),
-    ]
-    columns += [
-        (f"q{joint}", "float64", "rad", angle.format(joint)) for joint in numbers
-    ]
-    for name, unit, component in WRENCH:
-        meaning = f"external {component}, at the last measuring point"
-        columns.append((name, "float64", unit, meaning))
-    for axis in "xyz":
-        columns.append((axis, "float64", "m", f"measured position along {axis}"))
-    for axis in "xyz":
-        meaning = f"measured rotation vector about {axis}"
-        columns.append((f"r{axis}", "float64", "rad", meaning))
-    columns += [
-        (f"approach{joint}", "float64", "", approach.format(joint)) for joint in numbers
-    ]
-    columns += [
-        ("time_s", "float64", "s", "time since any instant"),
-        ("temperature_c", "float64", "°C", "temperature"),
-        ("u95_m", "float64", "m", u95),
-    ]
-    return {column[0]: Column(*column) for column in columns}
+    columns = _SCHEMA.for_joints(joints).columns
+    return {column.name: column for column in columns}
 
 
 def is_file(path: str | Path) -> bool:

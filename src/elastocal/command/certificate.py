@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from typer import Argument, Option
@@ -18,7 +18,7 @@ from elastocal.command.terminal import (
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from elastocal.io.documents import Document
 
 DOCUMENT = "certificate.json"
 PAGES = "certificate.pdf"
@@ -82,9 +82,7 @@ def certificate(
     raise typer.Exit(0 if passed else 1)
 
 
-def _write_certificate(
-    folder: Path, document: Mapping[str, Any], facts: Mapping[str, Any]
-) -> None:
+def _write_certificate(folder: Path, document: Document, facts: Document) -> None:
     """Write the pages of a certificate, with a picture of its error budget, and its
     contents as JSON."""
     from elastocal.figures.loop import draw_budget_bars

@@ -86,7 +86,7 @@ def correct(
     files = [output, program.path] if program else [output]
     _check_output(files)
     campaign = load_diagnosed_campaign(folder)
-    inputs = [*campaign.folder.files(), path]
+    inputs: list[str | Path] = [*campaign.folder.files(), path]
     check_replaceable(files, inputs, find_workplace(), force=force)
     robot = campaign.calibrated.robot
     axis_names = program.name_axes(robot) if program else ()

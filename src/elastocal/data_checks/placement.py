@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
 # Number of poses that suffices for faults of all measurements.
 MANY_POSES = 80
-# Geometric errors and deflections do not move a robot this far.
+# Lower bounds on a misplacement: geometric errors and deflections do not move a robot
+# this far.
 IMPLAUSIBLE_M = 0.02
 IMPLAUSIBLE_RAD = 0.1
 # Factor by which a correction must lower the residual.

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from elastocal.diagnosis.discrepancy import Discrepancy, build_discrepancies
-from elastocal.diagnosis.evidence import TermBlock
+from elastocal.diagnosis.evidence import TermBlock, list_pose_errors
 from elastocal.diagnosis.hypotheses import ModelTerm, build_terms
 from elastocal.diagnosis.search import SearchProblem, select_pose_errors
 from elastocal.diagnosis.statistics import (
@@ -266,7 +266,7 @@ class CandidateDesign:
     @property
     def candidate_pose_errors_rad(self) -> np.ndarray:
         """Sizes of the pose error that are considered, zero first."""
-        sizes = self.pose_std_error_rad * np.array(self.settings.pose_steps)
+        sizes = list_pose_errors(self.pose_std_error_rad, self.settings)
         return np.unique(np.minimum(sizes, self.max_pose_error_rad))
 
     @cached_property

@@ -25,6 +25,7 @@ from elastocal.diagnosis.fitted_subset import (
     sample_for_search,
     select_initial_subset,
 )
+from elastocal.diagnosis.grid_ends import warn_of_grid_ends
 from elastocal.diagnosis.gross_errors import (
     OutlierTest,
     describe_gross_errors,
@@ -39,7 +40,11 @@ from elastocal.fitting.least_squares import (
     INTERMEDIATE_TOLERANCE,
     fit_model,
 )
-from elastocal.fitting.model import Case, get_parameter_values
+from elastocal.fitting.model import (
+    Case,
+    build_nominal_model,
+    get_parameter_values,
+)
 from elastocal.fitting.noise import count_effective_parameters, serialize_noise
 from elastocal.fitting.observations import Observations
 from elastocal.io.typed_json import to_document
@@ -118,6 +123,11 @@ class Diagnosis:
         """The verdict as a JSON document."""
         document: dict[str, Any] = to_document(self.verdict)
         return document
+
+    @property
+    def nominal(self) -> Fit:
+        """The robot before any calibration: see `build_nominal_model`."""
+        return self.steps[0].fitted
 
     @property
     def declared(self) -> Fit:
@@ -630,7 +640,7 @@ def _choose_model(
     subset = rows.subset
     declared = subset.fit_to_all(subset.declared)
     frames = fit_model(
-        replace(subset.case.model, effects=()),
+        build_nominal_model(subset.case.model),
         subset.case.observations,
         subset.noise,
         tolerance=INTERMEDIATE_TOLERANCE,
@@ -738,6 +748,7 @@ def _contradict(
         warnings += verdict.warn_of_pose_error(
             result.steps[-1].fitted.noise, evidence.design.pose_std_error_rad
         )
+    warnings += warn_of_grid_ends(result.full_model, evidence)
     return replace(
         result,
         evidence=replace(evidence, conclusion=conclusion),

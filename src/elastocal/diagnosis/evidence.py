@@ -36,6 +36,9 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.settings import Settings
     from elastocal.diagnosis.statistics import SufficientStatistics
 
+# The grid of the pose error reaches this many times the largest size that physics
+# allows, so that an estimate of that size is not at its end.
+_BEYOND_PHYSICS = 2.0
 # A step of the ascent must raise the log density by more than rounding does.
 _NO_GAIN = 1e-9
 # If moving all terms at once does not raise the density, this many times fewer are
@@ -106,10 +109,39 @@ class SizeGrid:
 def compute_pose_error_log_prior(
     pose_error_rad: np.ndarray, settings: Settings
 ) -> np.ndarray:
-    """Log prior weights (T,) of the sizes of the pose error, one of which is zero."""
-    is_present = pose_error_rad > 0
-    share = settings.pose_error_probability / max(is_present.sum(), 1)
-    return np.log(np.where(is_present, share, 1.0 - settings.pose_error_probability))
+    """Log prior weights (T,) of the sizes of the pose error, one of which is zero.
+
+    The sizes other than zero have a half-Cauchy prior, whose scale is what robots repeat
+    to: its tail falls so slowly that measurements overrule it at any size (Gelman, Prior
+    distributions for variance parameters in hierarchical models, Bayesian Analysis 1,
+    2006). Its density in the logarithm of the size weighs the sizes of a grid in equal
+    ratios.
+    """
+    ratio = np.asarray(pose_error_rad) / settings.pose_repeatability_rad
+    density = ratio / (1.0 + ratio**2)
+    total = density.sum()
+    present = settings.pose_error_probability
+    if total > 0.0:
+        density *= present / total
+    with np.errstate(divide="ignore"):
+        return np.log(np.where(ratio > 0.0, density, 1.0 - present))
+
+
+def list_pose_errors(std_error_rad: float, settings: Settings) -> np.ndarray:
+    """List the sizes of the pose error that are considered, rad, zero first.
+
+    The grid starts below what one pose resolves and reaches beyond what physics allows:
+    an error that is larger than the whole grid would be left to the effects.
+
+    Parameters
+    ----------
+    std_error_rad : standard error of a joint angle from the measurements of one pose
+    settings : settings of the diagnosis
+    """
+    sizes = [std_error_rad * step for step in settings.pose_steps]
+    while sizes[-1] < _BEYOND_PHYSICS * settings.largest_pose_error_rad:
+        sizes.append(settings.pose_error_ratio * sizes[-1])
+    return np.array(sizes)
 
 
 def log_likelihood(squares: np.ndarray, degrees_of_freedom: int) -> np.ndarray:

@@ -52,12 +52,12 @@ from elastocal.validation.transfer import (
 )
 from elastocal.verdict import (
     BeforeAfter,
+    ErrorsBefore,
     ErrorsByRange,
     ErrorSummary,
     HeldOut,
     JointRange,
     Remainder,
-    UncalibratedErrors,
     Verdict,
 )
 
@@ -140,8 +140,9 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
         summaries = [_summarize(step_errors) for step_errors in errors]
         for row, summary in zip(rows, summaries, strict=True):
             row["heldout_rms_all_rows_m"] = summary.rms_m
-        before = summaries[_find_declared(diagnosis.steps)]
-        heldout = replace(heldout, with_gross_errors=BeforeAfter(before, summaries[-1]))
+        heldout = replace(
+            heldout, with_gross_errors=BeforeAfter(summaries[0], summaries[-1])
+        )
         warnings.append(
             f"held-out errors are without {format_count(len(gross_errors), 'gross error')}:"
             f" with all rows the RMS is {1e3 * summaries[-1].rms_m:.3g} mm"
@@ -322,16 +323,16 @@ def compare_held_out_errors(
         for step, step_errors, limits in zip(steps, errors, intervals, strict=True)
     ]
     by_range = summarize_errors_by_range(
-        {"before": errors[declared], "after": errors[-1]}, outside
+        {"before": errors[0], "after": errors[-1]}, outside
     )
     after = _summarize(errors[-1])
     states = held_out.observations.states
     heldout = HeldOut(
-        uncalibrated=UncalibratedErrors(
+        before=ErrorsBefore(
             **summarize_errors(errors[0].distance),
             reduction_ci95=(calibration.low, calibration.high),
         ),
-        before=_summarize(errors[declared]),
+        declared=_summarize(errors[declared]),
         after=after,
         noise_floor_rms_m=None if np.isnan(floor) else floor,
         reduction_ci95=(reductions[-1].low, reductions[-1].high),
@@ -379,12 +380,12 @@ def _tabulate_step(
 def _warn_of_growth(heldout: HeldOut) -> list[str]:
     warnings = []
     for name in METRICS:
-        before_mm = 1e3 * getattr(heldout.before, name)
+        declared_mm = 1e3 * getattr(heldout.declared, name)
         after_mm = 1e3 * getattr(heldout.after, name)
-        if after_mm > before_mm:
+        if after_mm > declared_mm:
             warnings.append(
                 f"the {_METRIC_NAMES[name]} of the validation poses grew from"
-                f" {before_mm:.3f} to {after_mm:.3f} mm"
+                f" {declared_mm:.3f} to {after_mm:.3f} mm"
             )
     return warnings
 
@@ -426,14 +427,14 @@ def generate_residual_blocks(
     diagnosis: Diagnosis, judgement: Judgement
 ) -> Iterator[dict[str, np.ndarray]]:
     """Generate blocks of the residuals table: every measurement with its residuals
-    before and after, gross errors after the others."""
+    before and after calibration, gross errors after the others."""
     no_poses = np.zeros(diagnosis.case.observations.cluster.max() + 1, bool)
     for case, outside, left_out, is_held_out in (
         (diagnosis.case, no_poses, diagnosis.left_out, False),
         (judgement.held_out, judgement.outside, judgement.left_out, True),
     ):
         stages = {
-            "before": transfer_fit(diagnosis.declared, diagnosis.case, case),
+            "before": transfer_fit(diagnosis.nominal, diagnosis.case, case),
             "after": transfer_fit(diagnosis.final, diagnosis.case, case),
         }
         measurements = case.campaign.measurements

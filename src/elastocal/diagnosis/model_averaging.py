@@ -281,8 +281,8 @@ def _select_pose_errors(
     best: ScoredModel,
     models: list[tuple[ScoredModel, float]],
 ) -> tuple[SufficientStatistics, np.ndarray]:
-    """Statistics at the pose errors that the best model makes likely and at those of
-    the other models, and the log weight of each, (T,)."""
+    """Select the statistics at the pose errors that the best model makes likely and at
+    those of the other models; returns them with the log weight of each, (T,)."""
     statistics = problem.statistics
     log_weights = statistics.log_likelihood + problem.log_pose
     if not best.term_indices:

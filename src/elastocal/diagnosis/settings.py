@@ -43,6 +43,7 @@ class Settings:
     scale_center: float = _DEFAULT.scale_center
     scale_spread: tuple[float, float] = _DEFAULT.scale_spread
     pose_steps: tuple[float, ...] = _DEFAULT.pose_steps
+    pose_error_ratio: float = _DEFAULT.pose_error_ratio
     pose_error_probability: float = _DEFAULT.pose_error_probability
     pose_repeatability_rad: float = _DEFAULT.pose_repeatability_rad
     harmonic_decay: float = _DEFAULT.harmonic_decay

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from elastocal.effects.sizes import Size
     from elastocal.mechanics.sites import Sites
 
-    # For each parameter: by coordinate of the sites, the displacement per unit of the
-    # parameter, ndarray (S,).
+    # Displacements of each parameter, by the coordinate of the sites that they move:
+    # ndarray (S,), per unit of the parameter.
     Displacements = list[dict[int, np.ndarray]]
     # From the conditions and one value of each shape.
     Law = Callable[..., Displacements]

@@ -42,6 +42,7 @@ from elastocal.exchange.column_names import (
     read_units,
     recognize_column,
 )
+from elastocal.io.storage import Columns
 from elastocal.io.texts import parse_number
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
@@ -568,9 +569,7 @@ def _number_poses(cells: Cells, angles: Sequence[str]) -> dict[str, np.ndarray]:
     return table
 
 
-def _number_loads_and_repeats(
-    cells: Cells, table: Mapping[str, np.ndarray]
-) -> dict[str, np.ndarray]:
+def _number_loads_and_repeats(cells: Cells, table: Columns) -> dict[str, np.ndarray]:
     """Read loads and repeats from their columns, or count them in the order in which
     they first appear."""
     states = pd.DataFrame(
@@ -592,9 +591,7 @@ def _number_loads_and_repeats(
     return {name: states[name].to_numpy() for name in ("load", "repeat")}
 
 
-def _number_loads(
-    poses: pd.DataFrame, table: Mapping[str, np.ndarray]
-) -> pd.Series[int]:
+def _number_loads(poses: pd.DataFrame, table: Columns) -> pd.Series[int]:
     """Number the different wrenches of each pose from 1; no wrench is load 0."""
     wrench = pd.DataFrame(
         {name: table.get(name, 0.0) for name in WRENCH_NAMES}, index=poses.index

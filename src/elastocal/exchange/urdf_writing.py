@@ -8,7 +8,6 @@ goes into the last fixed joint. Joint values mean the same before and after. A U
 rigid, so compliances are not in it.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
@@ -25,6 +24,7 @@ from elastocal.exchange.robot_text import (
     make_transform,
 )
 from elastocal.exchange.urdf import LARGEST_BYTES, Joint, Urdf, find_chain, read_urdf
+from elastocal.io.storage import Columns
 from elastocal.io.texts import read_bytes
 from elastocal.mechanics.chain import Chain, Transform, parse_chain
 from elastocal.mechanics.robot import Robot
@@ -194,7 +194,7 @@ def _offset_at_zero(nominal: Robot, calibrated: Robot) -> np.ndarray:
     return calibrated.reported_offset - factor @ nominal.reported_offset
 
 
-def _replace_origins(content: bytes, origins: Mapping[str, np.ndarray]) -> bytes:
+def _replace_origins(content: bytes, origins: Columns) -> bytes:
     """Replace the origins of joints in a file; comments inside the robot stay."""
     builder = ElementTree.TreeBuilder(insert_comments=True, insert_pis=True)
     root = ElementTree.fromstring(content, ElementTree.XMLParser(target=builder))

@@ -21,13 +21,12 @@ from elastocal.figures.style import (
 from elastocal.mechanics.kinematics import compute_poses
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from elastocal.application.planning.cell import Cell
     from elastocal.application.planning.plan import Plan
+    from elastocal.io.storage import Columns
     from elastocal.mechanics.robot import Robot
     from elastocal.verdict import HeldOut
 
@@ -95,9 +94,7 @@ def draw_arm(axis: Axes, links: np.ndarray, width: float) -> None:
 
 
 @styled
-def draw_arm_with_errors(
-    robot: Robot, table: Mapping[str, np.ndarray], heldout: HeldOut
-) -> Figure:
+def draw_arm_with_errors(robot: Robot, table: Columns, heldout: HeldOut) -> Figure:
     """Draw an arm and its held-out errors as arrows, before and after correction.
 
     One pose is drawn in full, the others as thin lines.

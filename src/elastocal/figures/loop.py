@@ -2,7 +2,7 @@
 and the contributions to the error."""
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 from typing import Any
@@ -26,6 +26,7 @@ from elastocal.figures.style import (
     label_decades,
     styled,
 )
+from elastocal.io.storage import Columns, Row
 from elastocal.report.words import (
     capitalize_first,
     choose_length_unit,
@@ -48,10 +49,10 @@ _VIEWS = {"from the side": [0, 2], "from above": [0, 1]}
 METRICS = {"mean": "mean", "rms": "RMS", "p95": "95th percentile", "max": "maximum"}
 # Colour and label of each kind of model.
 MODEL_STYLES = {
-    "frames": ("#b9b9b9", "frames and targets only"),
-    "declared": STAGES["before"][::-1],
+    "frames": ("#b9b9b9", "before"),
+    "declared": (PALETTE[1], "declared model"),
     "effect": STAGES["after"][::-1],
-    "kept": ("#777777", "frames and targets only, kept"),
+    "kept": ("#777777", "before, kept"),
 }
 # Above this ratio of the largest to the smallest error, the axis is logarithmic, because
 # the smallest bars would be invisible on a linear one.
@@ -108,7 +109,7 @@ _RESIDUAL_CONTRIBUTIONS = (
 TRACKER = "tracker"
 # Colour and label of each kind of contribution to an error budget.
 _CONTRIBUTION_STYLES = {
-    "uncorrected": ("#b9b9b9", "without any correction"),
+    "before": ("#b9b9b9", "before calibration"),
     "effect": (PALETTE[0], "if this alone were left out"),
     "residual": (PALETTE[2], "left after correction"),
     TRACKER: ("#ffffff", "in no robot: noise of a single measurement"),
@@ -139,9 +140,7 @@ class _ArrowScale:
 
 
 @styled
-def draw_residual_arrows(
-    table: Mapping[str, np.ndarray], arm: np.ndarray | None = None
-) -> Figure:
+def draw_residual_arrows(table: Columns, arm: np.ndarray | None = None) -> Figure:
     """Draw residuals as arrows at the measured positions, from the side and from above.
 
     Repeats are averaged. If there are many states, one state of each cell of a grid is
@@ -188,7 +187,7 @@ def draw_residual_arrows(
     return figure
 
 
-def _average_repeats(table: Mapping[str, np.ndarray]) -> _States:
+def _average_repeats(table: Columns) -> _States:
     """Mean position and residuals of each state and target."""
     keys = ["held_out", "session", "pose", "load", "target"]
     before = ["before_dx", "before_dy", "before_dz"]
@@ -315,7 +314,7 @@ def _draw_scale_arrow(axis: Axes, scale: _ArrowScale) -> None:
 
 @styled
 def draw_before_after(
-    steps: Sequence[Mapping[str, Any]], noise_floor_m: float | None = None
+    steps: Sequence[Row], noise_floor_m: float | None = None
 ) -> Figure:
     """Draw bars of the errors on held-out poses, one row for each model.
 
@@ -366,7 +365,7 @@ def _scale_error_axis(
 
 
 def _find_logarithmic_range(
-    steps: Sequence[Mapping[str, Any]], noise_floor_m: float | None
+    steps: Sequence[Row], noise_floor_m: float | None
 ) -> tuple[float, float] | None:
     """Smallest and largest error in m for a logarithmic axis; None if a linear one shows
     all errors."""
@@ -386,7 +385,7 @@ def _label_model(step: str) -> str:
     return textwrap.fill(list_first(effects, _NAMED_EFFECTS), _MODEL_LABEL_WIDTH)
 
 
-def _collect_errors(steps: Sequence[Mapping[str, Any]], poses: str) -> np.ndarray:
+def _collect_errors(steps: Sequence[Row], poses: str) -> np.ndarray:
     """Errors (models, metrics) in m on the held-out or the training poses."""
     columns = [f"{poses}_{metric}_m" for metric in METRICS]
     return np.array([itemgetter(*columns)(step) for step in steps])
@@ -394,7 +393,7 @@ def _collect_errors(steps: Sequence[Mapping[str, Any]], poses: str) -> np.ndarra
 
 def _draw_model_bars(
     axis: Axes,
-    steps: Sequence[Mapping[str, Any]],
+    steps: Sequence[Row],
     metric: str,
     rows: np.ndarray,
     factor: float,
@@ -481,9 +480,7 @@ def _name_campaigns(table: pd.DataFrame) -> pd.Series:
 
 
 @styled
-def draw_probabilities(
-    posterior: Probabilities | None, table: Mapping[str, np.ndarray]
-) -> Figure:
+def draw_probabilities(posterior: Probabilities | None, table: Columns) -> Figure:
     """Draw the posterior probabilities of the leading hypotheses, and the Bayes factors
     of the leading candidates alone.
 
@@ -571,7 +568,7 @@ def _draw_hypotheses(
 
 
 def _draw_factors(
-    axis: Axes, table: Mapping[str, np.ndarray], shown: np.ndarray, rows: np.ndarray
+    axis: Axes, table: Columns, shown: np.ndarray, rows: np.ndarray
 ) -> None:
     """Draw the Bayes factors of single candidates, coloured by family."""
     factors = table["log_bayes_factor"][shown]
@@ -633,7 +630,7 @@ def _label_rows(
     return rows
 
 
-def rank_candidates(table: Mapping[str, np.ndarray]) -> np.ndarray:
+def rank_candidates(table: Columns) -> np.ndarray:
     """Rank the tested candidates by falling Bayes factor.
 
     Of a candidate with a shape parameter, only its best value counts. Returns indices
@@ -657,7 +654,7 @@ def shorten_candidate_name(key: str) -> str:
 
 @styled
 def draw_budget_bars(
-    budget: Sequence[Mapping[str, Any]],
+    budget: Sequence[Row],
     names: Sequence[str],
     tolerance_m: float,
     tracker_m: float,
@@ -723,7 +720,7 @@ def _classify_contribution(name: str) -> str:
     return "effect"
 
 
-def _draw_contribution(axis: Axes, row: int, entry: Mapping[str, Any]) -> None:
+def _draw_contribution(axis: Axes, row: int, entry: Row) -> None:
     """Draw the bar of one contribution with its value in mm."""
     kind = _classify_contribution(entry["name"])
     size_mm = MILLI * entry["rms_m"]

@@ -38,7 +38,7 @@ PALETTE = (
 )
 # Label and colour of the errors of a campaign, before and after correction.
 STAGES = {
-    "before": ("declared model", PALETTE[1]),
+    "before": ("before", PALETTE[1]),
     "after": ("with the effects found", PALETTE[0]),
 }
 DASHES = (

@@ -272,7 +272,7 @@ class LinearModel:
 
     @property
     def joint_jacobian(self) -> np.ndarray:
-        """Of each target with respect to the joints, (M, rows, n)."""
+        """Jacobian of each target with respect to the joints, (M, rows, n)."""
         return self.columns.jacobian[..., : self.conditions.sites.joints]
 
     @cached_property

@@ -201,6 +201,20 @@ def build_declared_model(
     )
 
 
+def build_nominal_model(model: Model) -> Model:
+    """Build the model of the robot that the user has *before* any calibration.
+
+    It has the geometry of the robot file, and its springs only if the file states them:
+    joints of unknown compliance are rigid, because typical compliances are a scale for
+    identification and would bend under declared masses. Only frames and targets are
+    fitted. Every error that is called "before" is the error of this model.
+    """
+    compliance = model.nominal_compliance
+    if not model.compliance_known:
+        compliance = np.zeros_like(compliance)
+    return replace(model, effects=(), nominal_compliance=compliance)
+
+
 def list_parameters(model: Model, estimate: Estimate) -> list[tuple[str, Parameter]]:
     """List all fitted parameters in the order of the sensitivities.
 

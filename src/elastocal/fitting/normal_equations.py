@@ -592,7 +592,8 @@ class LeastSquaresProblem:
 
 
 def _map_to_rotation_vectors(residual: np.ndarray) -> np.ndarray:
-    """Matrices (M, rows, rows) from sensitivities of poses to those of the residual.
+    """Compute the matrices (M, rows, rows) that map sensitivities of poses to those of the
+    residual.
 
     If a pose turns by -w, its rotation vector r grows by w + r x w / 2 + O(r^2):
     Bortz's equation (IEEE Trans. Aerosp. Electron. Syst. 7, 1971).

@@ -1,6 +1,6 @@
 """Read tables as pandas data frames, and write data frames as CSV, Markdown and LaTeX."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -8,6 +8,9 @@ import pandas as pd
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.origin import Origin
 from elastocal.io.storage import TableSchema, read_provenance, read_table
+
+# Data frames by name.
+Frames = Mapping[str, pd.DataFrame]
 
 
 def read_frame(

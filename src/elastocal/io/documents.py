@@ -16,6 +16,8 @@ import yaml
 from elastocal.errors import InputError, find_text_fault, suggest_name, suggest_names
 from elastocal.io.texts import read_text
 
+# Contents of a document by its keys.
+Document = Mapping[str, Any]
 # Upper bounds on a document. They are far above what people write by hand (no schema is
 # deeper than 7), and a document within them is read in seconds whatever it holds.
 LARGEST_BYTES = 300_000
@@ -261,7 +263,7 @@ def check_document(document: Any, schema: str, source: str) -> None:
         default=None,
     )
     if error is not None:
-        raise _refusal(source, *_explain(error))
+        raise make_violation_error(source, error)
     for path, text in _iterate_texts(document):
         if path == ("chain",):
             # White space between the transforms of a chain may be a line break.
@@ -271,7 +273,7 @@ def check_document(document: Any, schema: str, source: str) -> None:
 
 
 def _refusal(
-    source: str, path: Sequence[str | int], finding: str, allowed: str
+    source: str | Path, path: Sequence[str | int], finding: str, allowed: str
 ) -> InputError:
     """Return an error at a key, with its line if the file has it."""
     key = "".join(
@@ -297,7 +299,7 @@ def _iterate_texts(
             yield from _iterate_texts(entry, (*path, index))
 
 
-def _find_line(source: str, path: Sequence[str | int]) -> str:
+def _find_line(source: str | Path, path: Sequence[str | int]) -> str:
     """Return the line of the file at which a key is, or else the entry that should
     contain it; empty if the file has neither."""
     try:
@@ -326,23 +328,23 @@ def _find_entry(node: Any, entry: str | int) -> tuple[Any, Any]:
     return None, None
 
 
-def _explain(error: Any) -> tuple[list[str | int], str, str]:
-    """Return the path of a violation, what was found there, and what is allowed."""
+def make_violation_error(source: str | Path, error: Any) -> InputError:
+    """Return the error of a document that violates its schema, as jsonschema found."""
     path = [*error.absolute_path]
     schema = error.schema
     if error.validator == "additionalProperties":
         keys = sorted(schema.get("properties", {}))
         unknown = next(name for name in error.instance if name not in keys)
         allowed = f"{suggest_name(unknown, keys)} ({', '.join(keys)})".strip()
-        return [*path, unknown], "an unknown key", allowed
+        return _refusal(source, [*path, unknown], "an unknown key", allowed)
     if error.validator == "required":
         missing = next(
             name for name in error.validator_value if name not in error.instance
         )
         allowed = _describe_schema(schema["properties"][missing])
-        return [*path, missing], "nothing", allowed
+        return _refusal(source, [*path, missing], "nothing", allowed or "a value")
     finding = "nothing" if error.instance is None else repr(error.instance)
-    return path, finding, _describe_schema(schema) or error.message
+    return _refusal(source, path, finding, _describe_schema(schema) or error.message)
 
 
 _KINDS = {

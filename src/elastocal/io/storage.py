@@ -23,6 +23,9 @@ from elastocal.errors import InputError
 from elastocal.io.atomic_writes import write_atomically
 from elastocal.io.texts import check_file
 
+# Columns of a table, and one of its rows, by the names of the columns.
+Columns = Mapping[str, np.ndarray]
+Row = Mapping[str, Any]
 # One value or an array for each column.
 Block = Mapping[str, np.ndarray | Sequence[str] | Sequence[float]]
 _TABLE = "elastocal.table"

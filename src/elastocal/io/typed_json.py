@@ -19,7 +19,7 @@ from typing import (
     get_type_hints,
 )
 
-from elastocal.errors import InputError
+from elastocal.io.documents import make_violation_error
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -29,12 +29,12 @@ Instance = TypeVar("Instance")
 
 # Metadata of a field that a document lacks while the field has its default value.
 OMITTED_BY_DEFAULT = {"omitted_by_default": True}
-_SCALARS: dict[type, tuple[str, tuple[type, ...]]] = {
-    str: ("string", (str,)),
-    bool: ("boolean", (bool,)),
-    int: ("integer", (int,)),
-    float: ("number", (int, float)),
-    NoneType: ("null", (NoneType,)),
+_SCALARS = {
+    str: "string",
+    bool: "boolean",
+    int: "integer",
+    float: "number",
+    NoneType: "null",
 }
 
 
@@ -72,12 +72,18 @@ def from_document(
     InputError
         If a key is missing or unknown, or if a value has another type than its field.
     """
-    instance: Instance = _from_value(cls, document, source, "")
+    from jsonschema.exceptions import best_match
+
+    expected: Any = cls
+    error = best_match(_make_validator(expected).iter_errors(document))
+    if error is not None:
+        raise make_violation_error(source, error)
+    instance: Instance = _build(cls, document)
     return instance
 
 
-def build_json_schema(cls: type) -> dict[str, Any]:
-    """Return the JSON schema of a dataclass, with one definition for each class."""
+def build_json_schema(cls: Any) -> dict[str, Any]:
+    """Return the JSON schema of a type, with one definition for each dataclass."""
     definitions: dict[str, Any] = {}
     reference = _schema_of(cls, definitions)
     return {
@@ -99,130 +105,40 @@ def _is_required(entry: Field[Any]) -> bool:
 _resolve_hints = cache(get_type_hints)
 
 
-def _from_value(expected: Any, value: Any, source: str | Path, key: str) -> Any:
-    """Check a value against a type and build the type's dataclasses from it."""
-    if expected is Any:
-        return value
+@cache
+def _make_validator(expected: Any) -> Any:
+    """Return the validator of a type."""
+    from jsonschema import Draft202012Validator
+
+    return Draft202012Validator(build_json_schema(expected))
+
+
+def _build(expected: Any, value: Any) -> Any:
+    """Build the dataclasses of a type from a value that its schema allows."""
     origin = get_origin(expected)
-    if origin in (Union, UnionType):
-        member = _choose_member(get_args(expected), value, source, key)
-        return _from_value(member, value, source, key)
+    arguments = get_args(expected)
     if is_dataclass(expected):
-        return _from_mapping(expected, value, source, key)
-    if origin is tuple:
-        return _from_list(get_args(expected), value, source, key)
+        return _build_instance(expected, value)
     if origin is dict:
-        _check(isinstance(value, dict), value, "a mapping", source, key)
-        entry_type = get_args(expected)[1]
-        return {
-            name: _from_value(entry_type, entry, source, _join(key, name))
-            for name, entry in value.items()
-        }
-    _check(_is_scalar(expected, value), value, _SCALARS[expected][0], source, key)
+        return {name: _build(arguments[1], entry) for name, entry in value.items()}
+    if origin is tuple:
+        if arguments[-1] is Ellipsis:
+            arguments = arguments[:1] * len(value)
+        return tuple(map(_build, arguments, value))
+    if origin in (Union, UnionType) and value is not None:
+        members = [member for member in arguments if member is not NoneType]
+        if len(members) > 1:
+            members = [
+                member for member in members if _make_validator(member).is_valid(value)
+            ]
+        return _build(members[0], value)
     return value
 
 
-def _from_mapping(cls: Any, value: Any, source: str | Path, key: str) -> Any:
-    _check(isinstance(value, dict), value, "a mapping", source, key)
-    required = {entry.name for entry in fields(cls) if _is_required(entry)}
-    allowed = {entry.name for entry in fields(cls)}
-    for name in sorted(required - value.keys()):
-        raise InputError(source, _join(key, name), "nothing", "a value")
-    for name in sorted(value.keys() - allowed):
-        raise InputError(
-            source, _join(key, name), "an unknown key", ", ".join(sorted(allowed))
-        )
+def _build_instance(cls: Any, document: Mapping[str, Any]) -> Any:
     hints = _resolve_hints(cls)
-    return cls(
-        **{
-            name: _from_value(hints[name], entry, source, _join(key, name))
-            for name, entry in value.items()
-        }
-    )
-
-
-def _from_list(
-    entry_types: tuple[Any, ...], value: Any, source: str | Path, key: str
-) -> tuple[Any, ...]:
-    _check(isinstance(value, list), value, "a list", source, key)
-    if entry_types[-1] is Ellipsis:
-        entry_types = entry_types[:1] * len(value)
-    _check(
-        len(value) == len(entry_types),
-        value,
-        f"a list of {len(entry_types)}",
-        source,
-        key,
-    )
-    return tuple(
-        _from_value(entry_type, entry, source, f"{key}[{index}]")
-        for index, (entry_type, entry) in enumerate(
-            zip(entry_types, value, strict=True)
-        )
-    )
-
-
-def _choose_member(
-    members: tuple[Any, ...], value: Any, source: str | Path, key: str
-) -> Any:
-    """Return the member of a union that a value belongs to."""
-    for member in members:
-        if _fits(member, value):
-            return member
-    names = " or ".join(_name_type(member) for member in members)
-    raise InputError(source, key, _shorten(value), names)
-
-
-def _fits(member: Any, value: Any) -> bool:
-    """Whether a value has a type on its outermost level.
-
-    Dataclasses are distinguished by their keys.
-    """
-    if is_dataclass(member):
-        if not isinstance(value, dict):
-            return False
-        required = {entry.name for entry in fields(member) if _is_required(entry)}
-        return required <= value.keys() <= {entry.name for entry in fields(member)}
-    if get_origin(member) is tuple:
-        return isinstance(value, list)
-    if get_origin(member) is dict:
-        return isinstance(value, dict)
-    return member is Any or _is_scalar(member, value)
-
-
-def _is_scalar(expected: Any, value: Any) -> bool:
-    """Whether a value has a scalar type; true and false are no numbers."""
-    if isinstance(value, bool):
-        return expected is bool
-    return isinstance(value, _SCALARS[expected][1])
-
-
-def _check(
-    is_valid: bool,  # noqa: FBT001 - the outcome of the check before it
-    value: Any,
-    allowed: str,
-    source: str | Path,
-    key: str,
-) -> None:
-    if not is_valid:
-        raise InputError(source, key, _shorten(value), allowed)
-
-
-def _join(key: str, name: str) -> str:
-    return f"{key}.{name}" if key else name
-
-
-def _shorten(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
-
-
-def _name_type(member: Any) -> str:
-    if member in _SCALARS:
-        return _SCALARS[member][0]
-    if is_dataclass(member):
-        return str(getattr(member, "__name__", member))
-    return "a list" if get_origin(member) is tuple else "a mapping"
+    entries = {name: _build(hints[name], entry) for name, entry in document.items()}
+    return cls(**entries)
 
 
 def _schema_of(expected: Any, definitions: dict[str, Any]) -> dict[str, Any]:
@@ -230,7 +146,7 @@ def _schema_of(expected: Any, definitions: dict[str, Any]) -> dict[str, Any]:
     if expected is Any:
         return {}
     if expected in _SCALARS:
-        return {"type": _SCALARS[expected][0]}
+        return {"type": _SCALARS[expected]}
     if is_dataclass(expected):
         return _reference(expected, definitions)
     arguments = get_args(expected)

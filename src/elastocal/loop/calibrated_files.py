@@ -14,7 +14,6 @@ import numpy as np
 from elastocal import __version__
 from elastocal.application.accuracy import (
     REGION,
-    compute_uncorrected_rms_m,
     predict_errors,
     select_campaign_commands,
 )
@@ -128,13 +127,8 @@ class DiagnosedCampaign:
             remainder=None,
             heldout=replace(self.verdict.heldout, delivered=self.verdict.heldout.after),
         )
-        physics = self.verdict.physics
-        if physics:
-            verdict = replace(
-                verdict,
-                accuracy=physics.accuracy,
-                uncorrected_m=physics.uncorrected_m,
-            )
+        if self.verdict.physics:
+            verdict = replace(verdict, accuracy=self.verdict.physics)
         return replace(self, verdict=verdict)
 
 
@@ -260,7 +254,8 @@ def build_certificate(
         )
     if missing and decision.decision == PASS:
         decision = replace(decision, decision=UNDECIDED)
-    budget = compute_error_budget(calibrated, *commands)
+    budget = {"before": heldout.before.rms_m}
+    budget |= compute_error_budget(calibrated, *commands)
     return {
         "campaign": campaign.name,
         "robot": robot.name,
@@ -276,7 +271,7 @@ def build_certificate(
         "effects": [effect.name for effect in verdict.effects],
         "errors": tabulate_errors(verdict),
         "validation_rms_m": {
-            "uncorrected": heldout.uncalibrated.rms_m,
+            "before": heldout.before.rms_m,
             "corrected": heldout.delivered.rms_m,
         },
         "regression": verdict.remainder.words if verdict.remainder else "",
@@ -313,7 +308,7 @@ def compute_error_budget(
 ) -> dict[str, float]:
     """Compute the error budget of a robot over commands, RMS, m.
 
-    The entries are: the error without any correction; each effect, by its name in the
+    The entries are: each effect, by its name in the
     catalogue or ``joint_compliance``, if it alone were left out of the correction,
     largest first; and the errors that the correction leaves, by
     `accuracy.predict_errors`. Only the squares of the last group add up, because effects
@@ -331,9 +326,7 @@ def compute_error_budget(
     contributions = compute_effect_contributions(calibrated, reported_angles, wrench)
     by_size = sorted(contributions, key=contributions.__getitem__, reverse=True)
     remaining = predict_errors(calibrated, reported_angles, wrench, draws=0)
-    budget = {
-        "uncorrected": compute_uncorrected_rms_m(calibrated, reported_angles, wrench)
-    }
+    budget = {}
     for name in by_size:
         if contributions[name] > 0.0:
             budget[name] = contributions[name]

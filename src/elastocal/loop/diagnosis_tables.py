@@ -15,7 +15,12 @@ from elastocal.diagnosis.next_experiment import propose_experiment
 from elastocal.diagnosis.search import screen_terms
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import fit_model
-from elastocal.fitting.model import Estimate, build_case, list_parameters
+from elastocal.fitting.model import (
+    Estimate,
+    build_case,
+    build_nominal_model,
+    list_parameters,
+)
 from elastocal.fitting.noise import parse_noise, serialize_noise
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.origin import describe_provenance
@@ -225,6 +230,8 @@ def restore_step_model(case: Case, step: Mapping[str, Any]) -> tuple[Model, Esti
     for name in _EFFECT_PARAMETERS:
         values[name] = tuple(np.array(entry, float) for entry in stated[name])
     model = replace(case.model, effects=tuple(effects))
+    if step["kind"] in ("frames", "kept"):
+        model = build_nominal_model(model)
     return model, Estimate(tuple(stated["sessions"]), **values)
 
 

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 _STATE = ("session", "pose", "load", "repeat", "target", "row")
 # Beginnings of the names of columns that a campaign need not record; they hold NaN then.
 _OPTIONAL = ("rx", "ry", "rz", "approach", "time_s", "temperature_c", "u95_m")
-# Residuals of the declared model and of the final one, by the prefix of their columns.
-_STAGES = {"before": "declared model", "after": "with the effects found"}
+# Residuals before the calibration and of the final model, by the prefix of their columns.
+_STAGES = {"before": "robot before its calibration", "after": "with the effects found"}
 
 
 def build_measurements_schema(joints: int) -> TableSchema:
@@ -139,8 +139,8 @@ def read_residuals(path: str | Path, joints: int) -> dict[str, np.ndarray]:
 
 
 def find_worst_measurement(table: Mapping[str, np.ndarray]) -> int:
-    """Find the row of a residuals table with the largest position error of the declared
-    model."""
+    """Find the row of a residuals table with the largest position error before the
+    calibration."""
     residual = [table[f"before_d{axis}"] for axis in "xyz"]
     return int(np.argmax(np.linalg.norm(residual, axis=0)))
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from elastocal.application.accuracy import (
-    compute_uncorrected_rms_m,
     inflate_to_held_out_errors,
     predict_campaign_accuracy,
     select_campaign_commands,
@@ -33,7 +32,7 @@ from elastocal.loop.loading import load_campaign
 from elastocal.loop.schemas import build_residuals_schema
 from elastocal.validation.held_out import compute_position_residuals
 from elastocal.validation.transfer import transfer_fit
-from elastocal.verdict import PredictedErrors, write_verdict
+from elastocal.verdict import write_verdict
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -162,8 +161,7 @@ def judge_and_predict(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgem
     """Judge a diagnosis on held-out poses, and predict the accuracy of the corrected
     robot.
 
-    Adds to the verdict, unless the data have a fault: ``accuracy``; ``uncorrected_m``,
-    the RMS error at the same poses without a correction; ``physics``, both numbers for
+    Adds to the verdict, unless the data have a fault: ``accuracy``; ``physics``, the same for
     a robot that is corrected without the residual regression, None if there is no
     regression; ``cost_m`` of each effect that a command contains, the RMS error over
     the campaign's poses and loads if this effect alone were left out of the
@@ -179,7 +177,7 @@ def judge_and_predict(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgem
         physics_robot = build_calibrated_robot(
             diagnosis, judgement.held_out, judgement.delivered, physics_only=True
         )
-        physics = _predict_errors(physics_robot)
+        physics = predict_campaign_accuracy(physics_robot)
     contributions = compute_effect_contributions(
         replace(robot, residual_model=None), *select_campaign_commands(robot)
     )
@@ -187,23 +185,12 @@ def judge_and_predict(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgem
         replace(effect, cost_m=contributions.get(effect.name))
         for effect in verdict.missing_effects
     )
-    predicted = _predict_errors(robot)
     misplaced = find_misplaced_frames(diagnosis.final, diagnosis.case.campaign)
     verdict = replace(
         verdict,
         effects=effects,
-        accuracy=predicted.accuracy,
-        uncorrected_m=predicted.uncorrected_m,
+        accuracy=predict_campaign_accuracy(robot),
         physics=physics,
         misplaced=tuple(misplaced),
     )
     return replace(judgement, verdict=verdict)
-
-
-def _predict_errors(robot: CalibratedRobot) -> PredictedErrors:
-    """Predict the accuracy of a corrected robot, and in the same frame the RMS error of
-    the uncorrected one at the same poses."""
-    return PredictedErrors(
-        predict_campaign_accuracy(robot),
-        compute_uncorrected_rms_m(robot, *select_campaign_commands(robot)),
-    )

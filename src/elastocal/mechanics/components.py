@@ -5,9 +5,5 @@ COMPONENTS = (
     *((f"d{axis}", "m", f"displacement along base {axis}") for axis in "xyz"),
     *((f"r{axis}", "rad", f"rotation vector about base {axis}") for axis in "xyz"),
 )
-WRENCH = (
-    *((f"f{axis}", "N", f"force along base {axis}") for axis in "xyz"),
-    *((f"m{axis}", "N m", f"moment about base {axis}") for axis in "xyz"),
-)
 COMPONENT_NAMES = tuple(name for name, _, _ in COMPONENTS)
-WRENCH_NAMES = tuple(name for name, _, _ in WRENCH)
+WRENCH_NAMES = ("fx", "fy", "fz", "mx", "my", "mz")

@@ -12,8 +12,9 @@ from elastocal.report.typesetting import render_sentences
 from elastocal.verdict import Accuracy, JointRange, RepeatableResidual
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
     from typing import Any
+
+    from elastocal.io.documents import Document
 
 # Entries of the error budget that have other words than an effect of the catalogue.
 _SHARES = {
@@ -21,7 +22,7 @@ _SHARES = {
     "declared_weight": "errors of the declared weights",
     "joint_offset": "joint offsets",
     "link_geometry": "link geometry",
-    "uncorrected": "no correction at all",
+    "before": "before calibration, as measured at validation poses",
     "form of the model": "form of the model",
     "not commanded": "effects that no command contains",
     "regression": "regression on the remainder",
@@ -33,7 +34,7 @@ _SMALLEST_SHOWN_M = 1e-7
 _LISTS = ("misplaced", "identity", "data")
 
 
-def collect_certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
+def collect_certificate_facts(document: Document) -> dict[str, Any]:
     """Return the facts for the pages of a certificate: strings ready to print, and lists
     for tables.
 

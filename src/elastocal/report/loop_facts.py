@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from typing import Any
 
+    from elastocal.io.storage import Columns, Row
     from elastocal.verdict import (
         Compliances,
         FaultValue,
@@ -101,8 +102,8 @@ def format_title(
 
 def render_campaign_sentences(
     verdict: Verdict,
-    steps: Sequence[Mapping[str, Any]] = (),
-    experiment: Sequence[Mapping[str, Any]] = (),
+    steps: Sequence[Row] = (),
+    experiment: Sequence[Row] = (),
     descriptions: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Render the sentences of `campaign.txt` on a campaign, by headings.
@@ -135,11 +136,11 @@ def render_campaign_sentences(
 
 def collect_loop_facts(
     verdict: Verdict,
-    steps: Sequence[Mapping[str, Any]],
-    experiment: Sequence[Mapping[str, Any]],
-    table: Mapping[str, np.ndarray],
+    steps: Sequence[Row],
+    experiment: Sequence[Row],
+    table: Columns,
     descriptions: Mapping[str, Any],
-    parameters: Mapping[str, np.ndarray],
+    parameters: Columns,
 ) -> dict[str, Any]:
     """Return the facts of the report of a campaign.
 
@@ -192,9 +193,7 @@ def collect_loop_facts(
     }
 
 
-def _list_undetermined(
-    verdict: Verdict, parameters: Mapping[str, np.ndarray]
-) -> list[str]:
+def _list_undetermined(verdict: Verdict, parameters: Columns) -> list[str]:
     """Return the parameters that the measurements do not determine, without those that
     the search has chosen."""
     chosen_by_search = {
@@ -422,7 +421,7 @@ def describe_fault(fault: DataFault) -> dict[str, Any]:
     }
 
 
-def _format_interval(step: Mapping[str, Any]) -> str:
+def _format_interval(step: Row) -> str:
     """Return the RMS error of a step on validation poses with its 95 % interval, in one
     unit."""
     factor, unit = say.choose_length_unit(step["heldout_rms_m"])
@@ -478,7 +477,7 @@ def _format_value(entry: EffectParameter | FaultValue) -> tuple[str, str]:
     return number, unit
 
 
-def _cell(row: Mapping[str, Any], name: str, factor: float, unit: str) -> list[str]:
+def _cell(row: Row, name: str, factor: float, unit: str) -> list[str]:
     """Return a value and its interval as the lines of a cell."""
     number = _format_length(factor * row[name], unit)
     low = factor * row[f"{name}_low"]
@@ -495,9 +494,7 @@ def _format_length(length: float, unit: str) -> str:
     return say.set_minus(f"{length:.0f}") if np.isfinite(length) else ""
 
 
-def tabulate_steps(
-    steps: Sequence[Mapping[str, Any]], floor_m: float | None
-) -> dict[str, Any]:
+def tabulate_steps(steps: Sequence[Row], floor_m: float | None) -> dict[str, Any]:
     """Return the table of errors before and after, with its unit.
 
     Parameters
@@ -534,7 +531,7 @@ def tabulate_steps(
     return {"unit": unit, "rows": rows}
 
 
-def tabulate_experiment(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def tabulate_experiment(rows: Sequence[Row]) -> dict[str, Any]:
     """Return the table of the proposed states, with angles in degrees."""
     if not rows:
         return {"loaded": False, "heads": [], "rows": [], "points": ""}
@@ -597,7 +594,7 @@ def tabulate_undetermined(held: Iterable[str]) -> list[list[str]]:
     ]
 
 
-def find_prior_dominated(parameters: Mapping[str, np.ndarray]) -> list[str]:
+def find_prior_dominated(parameters: Columns) -> list[str]:
     """Return the parameters about which the measurements say hardly more than their
     priors: owner and name."""
     is_wide = parameters["std_error"] > MOSTLY_PRIOR * parameters["prior_std"]

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from elastocal.io.origin import Origin
+    from elastocal.io.storage import Columns
     from elastocal.mechanics.robot import Robot
 
 # Upper bound on the measurements of a page; more are slow to rotate on a phone.
@@ -33,7 +34,7 @@ _STAGES = ("before", "after")
 
 
 def build_loop_page(
-    facts: Mapping[str, Any], table: Mapping[str, np.ndarray], robot: Robot
+    facts: Mapping[str, Any], table: Columns, robot: Robot
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the texts of the page of a campaign, and the data that it draws.
 
@@ -80,7 +81,7 @@ def build_loop_page(
     return page, data
 
 
-def _select_measurements(table: Mapping[str, np.ndarray]) -> np.ndarray:
+def _select_measurements(table: Columns) -> np.ndarray:
     """Return the rows that the page shows, evenly spread and with the worst one."""
     count = len(table["x"])
     if count <= _MAX_MEASUREMENTS:
@@ -89,7 +90,7 @@ def _select_measurements(table: Mapping[str, np.ndarray]) -> np.ndarray:
     return np.unique([*spread, find_worst_measurement(table)])
 
 
-def _draw_poses(selection: Mapping[str, np.ndarray], robot: Robot) -> dict[str, Any]:
+def _draw_poses(selection: Columns, robot: Robot) -> dict[str, Any]:
     """Return the robot in some poses, the one with the largest error among them.
 
     Poses are in the order of their first measurement. Validation poses of another
@@ -126,16 +127,14 @@ def _draw_poses(selection: Mapping[str, np.ndarray], robot: Robot) -> dict[str, 
     }
 
 
-def _find_target_rows(
-    selection: Mapping[str, np.ndarray], rows: np.ndarray
-) -> list[int]:
+def _find_target_rows(selection: Columns, rows: np.ndarray) -> list[int]:
     """Return the first of some rows for each target."""
     first = np.unique(selection["target"][rows], return_index=True)[1]
     target_rows: list[int] = rows[first].tolist()
     return target_rows
 
 
-def _stack_residuals_um(selection: Mapping[str, np.ndarray], stage: str) -> np.ndarray:
+def _stack_residuals_um(selection: Columns, stage: str) -> np.ndarray:
     """Return the position residuals (N, 3) of a stage, µm."""
     components = [selection[f"{stage}_d{axis}"] for axis in "xyz"]
     return say.MICRO * np.column_stack(components)
@@ -183,9 +182,7 @@ def _spread(count: int, limit: int) -> np.ndarray:
     return np.unique(indices.round().astype(int))
 
 
-def _list_quantities(
-    selection: Mapping[str, np.ndarray], robot: Robot
-) -> list[dict[str, Any]]:
+def _list_quantities(selection: Columns, robot: Robot) -> list[dict[str, Any]]:
     """Return the quantities that vary, to plot residuals against."""
     angles = stack_joint_angles(selection, robot.joints)
     quantities = []

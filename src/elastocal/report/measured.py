@@ -10,16 +10,14 @@ from elastocal.counting import format_count, format_integer
 from elastocal.report import words as say
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from typing import Any
+    from elastocal.io.documents import Document
+    from elastocal.io.storage import Columns
 
 # Targets that are listed by name.
 _MAX_TARGETS = 12
 
 
-def tabulate_measured(
-    table: Mapping[str, np.ndarray], descriptions: Mapping[str, Any]
-) -> list[list[str]]:
+def tabulate_measured(table: Columns, descriptions: Document) -> list[list[str]]:
     """Return rows on the measurements: name, at fitted poses, at validation poses.
 
     Parameters
@@ -43,15 +41,11 @@ def tabulate_measured(
     ]
 
 
-def _select_rows(
-    table: Mapping[str, np.ndarray], mask: np.ndarray
-) -> dict[str, np.ndarray]:
+def _select_rows(table: Columns, mask: np.ndarray) -> dict[str, np.ndarray]:
     return {name: values[mask] for name, values in table.items()}
 
 
-def _describe_measurements(
-    table: Mapping[str, np.ndarray], campaign: Mapping[str, Any]
-) -> dict[str, str]:
+def _describe_measurements(table: Columns, campaign: Document) -> dict[str, str]:
     """Return the cells of one part of the measurements, by the name of their row."""
     count = len(table["pose"])
     if not count:
@@ -84,13 +78,13 @@ def _describe_measurements(
     }
 
 
-def _count_combinations(table: Mapping[str, np.ndarray], *names: str) -> np.ndarray:
+def _count_combinations(table: Columns, *names: str) -> np.ndarray:
     """Return how often each combination of values of some columns occurs."""
     columns = np.column_stack([table[name] for name in names])
     return np.unique(columns, axis=0, return_counts=True)[1]
 
 
-def _describe_loads(table: Mapping[str, np.ndarray]) -> str:
+def _describe_loads(table: Columns) -> str:
     """Return number, range and share of the loads in words."""
     force = np.linalg.norm([table[name] for name in ("fx", "fy", "fz")], axis=0)
     loaded = force[force > 0]
@@ -105,8 +99,8 @@ def _describe_loads(table: Mapping[str, np.ndarray]) -> str:
 
 
 def _describe_targets(
-    table: Mapping[str, np.ndarray],
-    campaign: Mapping[str, Any],
+    table: Columns,
+    campaign: Document,
     *,
     has_orientations: bool,
 ) -> str:
@@ -121,7 +115,7 @@ def _describe_targets(
     return say.join_items(descriptions, _MAX_TARGETS)
 
 
-def _describe_mount(target: Mapping[str, Any], *, has_orientations: bool) -> str:
+def _describe_mount(target: Document, *, has_orientations: bool) -> str:
     """Return the rotation of a target's mount, and which parts of its placement are
     fitted; only orientations say anything of the rotation."""
     offset = target["offset_m"]

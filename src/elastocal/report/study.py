@@ -22,6 +22,8 @@ from elastocal.study.uses import METRICS, REFERENCE
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from elastocal.io.data_frames import Frames
+    from elastocal.io.storage import Row
     from elastocal.study.strategies import Strategy
 
 # Repeatability that the paper states for both robots.
@@ -75,7 +77,7 @@ class _Tables:
         The same as lists of rows.
     """
 
-    def __init__(self, frames: Mapping[str, pd.DataFrame]) -> None:
+    def __init__(self, frames: Frames) -> None:
         self.frames = frames
         self.records = {name: _list_records(frame) for name, frame in frames.items()}
 
@@ -93,10 +95,10 @@ class _Tables:
 
 
 def collect_study_facts(
-    tables: Mapping[str, pd.DataFrame],
+    tables: Frames,
     names: Mapping[str, str],
     robots: Sequence[str],
-    settings: Mapping[str, Any],
+    settings: Row,
 ) -> dict[str, Any]:
     """Collect the facts for the report of the study.
 
@@ -166,7 +168,7 @@ def collect_study_facts(
 
 
 def _prepare_frames(
-    tables: Mapping[str, pd.DataFrame], names: Mapping[str, str], accuracy_um: float
+    tables: Frames, names: Mapping[str, str], accuracy_um: float
 ) -> dict[str, pd.DataFrame]:
     """Name the robots in the tables, and add the selections that the report shows."""
     frames = {name: _name_robots(frame, names) for name, frame in tables.items()}
@@ -234,7 +236,7 @@ def format_paper_rows(
 
 
 def format_paper_tables(
-    frames: Mapping[str, pd.DataFrame], names: Mapping[str, str], configurations: int
+    frames: Frames, names: Mapping[str, str], configurations: int
 ) -> dict[str, list[list[str]]]:
     """Format the paper's tables of one study as rows of cells, heads first.
 
@@ -259,7 +261,7 @@ def _list_records(frame: pd.DataFrame) -> list[dict[str, Any]]:
     return rows
 
 
-def format_ratio(row: Mapping[str, Any]) -> str:
+def format_ratio(row: Row) -> str:
     """Format a row's ratio with its interval."""
     return f"{row['ratio']:.3f} ({row['ratio_low']:.3f} to {row['ratio_high']:.3f})"
 
@@ -276,7 +278,7 @@ def _format_score(
     return text
 
 
-def _format_median(row: Mapping[str, Any], name: str, configurations: int) -> str:
+def _format_median(row: Row, name: str, configurations: int) -> str:
     """Format a median over studies with its robust deviation.
 
     Lengths are whole numbers, marked beyond a data set; long ones are not stated.
@@ -332,9 +334,7 @@ def _list_estimators(table: pd.DataFrame, configurations: int) -> list[dict[str,
     return rows
 
 
-def _format_medians(
-    row: Mapping[str, Any], names: Sequence[str], configurations: int
-) -> list[str]:
+def _format_medians(row: Row, names: Sequence[str], configurations: int) -> list[str]:
     """Format several medians of a row, see `_format_median`."""
     return [_format_median(row, name, configurations) for name in names]
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from elastocal.errors import InputError
 from elastocal.io.documents import (
+    Document,
     check_document,
     locate_document,
     parse_yaml,
@@ -50,7 +51,7 @@ class Study:
 
 
 def check_study(
-    config: Mapping[str, Any], folder: str | Path, source: str = "config.yaml"
+    config: Document, folder: str | Path, source: str = "config.yaml"
 ) -> Study:
     """Read the robots and strategies that a configuration names and check all of them
     together.
@@ -109,7 +110,7 @@ def check_study(
     )
 
 
-def _check_simulation_keys(robot: Mapping[str, Any], source: str) -> None:
+def _check_simulation_keys(robot: Document, source: str) -> None:
     """Refuse a robot file without the values that a simulation needs."""
     for key in _SIMULATION_KEYS:
         if key not in robot:
@@ -122,7 +123,7 @@ def _check_simulation_keys(robot: Mapping[str, Any], source: str) -> None:
 
 
 def _check_distinct_names(
-    documents: Mapping[str, Mapping[str, Any]], folder: str | Path
+    documents: Mapping[str, Document], folder: str | Path
 ) -> None:
     """Refuse two strategies with the same name."""
     files: dict[str, str] = {}
@@ -137,7 +138,7 @@ def _check_distinct_names(
             )
 
 
-def _check_length(strategy: Strategy, config: Mapping[str, Any], source: str) -> None:
+def _check_length(strategy: Strategy, config: Document, source: str) -> None:
     """Refuse data sets that are too short for a strategy."""
     components = count_components(config["interpretations"]["measured"])
     needed = find_first_solvable_length(strategy, components)
@@ -151,7 +152,7 @@ def _check_length(strategy: Strategy, config: Mapping[str, Any], source: str) ->
 
 
 def _check_point_sets(
-    config: Mapping[str, Any],
+    config: Document,
     chains: Mapping[str, Chain],
     folder: str | Path,
     source: str,
@@ -175,9 +176,7 @@ def _check_point_sets(
                 raise InputError(source, key, repr(name), ", ".join(allowed))
 
 
-def override_entries(
-    config: Mapping[str, Any], entries: Iterable[str]
-) -> dict[str, Any]:
+def override_entries(config: Document, entries: Iterable[str]) -> dict[str, Any]:
     """Change keys of a configuration on the command line; values are read as in the
     file.
 
@@ -225,7 +224,7 @@ def _check_noise_levels(levels: Iterable[float], source: str) -> None:
             )
 
 
-def _check_tables(config: Mapping[str, Any], source: str) -> None:
+def _check_tables(config: Document, source: str) -> None:
     """Refuse tables of strategies, noise levels or lengths that are not simulated."""
     tables = config["tables"]
     for key, name in (("classical_strategy", "strategies"), ("noise_um", "noise_um")):

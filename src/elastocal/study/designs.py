@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from elastocal.io.data_frames import Frames
     from elastocal.study.in_memory import StudyInMemory
 
 RANDOM = "random"
@@ -221,7 +222,7 @@ def _simulate_estimates(
     return np.moveaxis(estimates, 1, 0).reshape(joints, -1)
 
 
-def build_designs_table(designs: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+def build_designs_table(designs: Frames) -> pd.DataFrame:
     """Simulated errors of random and chosen configurations by the kind of load.
 
     Parameters

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.io.storage import read_blocks
+from elastocal.io.storage import Columns, read_blocks
 from elastocal.mechanics.elastostatics import (
     build_regressor,
     compute_generalized_forces,
@@ -40,9 +40,7 @@ if TYPE_CHECKING:
     from elastocal.study.strategies import Stage, Strategy
 
 # Columns of one block of experiments and, for each measuring point, of its deflections.
-Blocks = Iterable[
-    tuple[Mapping[str, np.ndarray], Mapping[str, Mapping[str, np.ndarray]]]
-]
+Blocks = Iterable[tuple[Columns, Mapping[str, Columns]]]
 # Above this condition number the measurements do not determine the compliances.
 # Condition numbers come from squares of singular values, so larger ones than the root
 # of the machine's precision mean nothing.
@@ -391,8 +389,8 @@ def read_measured_blocks(job: Job, joints: int, points: Iterable[str]) -> Blocks
 
 
 def pair_blocks(
-    experiments: Iterable[Mapping[str, np.ndarray]],
-    deflections: Mapping[str, Iterable[Mapping[str, np.ndarray]]],
+    experiments: Iterable[Columns],
+    deflections: Mapping[str, Iterable[Columns]],
 ) -> Blocks:
     """Pair blocks of the experiments with the blocks of each measuring point."""
     for block, *measured in zip(experiments, *deflections.values(), strict=True):

@@ -57,6 +57,7 @@ from elastocal.study.strategies import drop_superseded_stages, strategy_from_doc
 if TYPE_CHECKING:
     import pandas as pd
 
+    from elastocal.io.storage import Columns
     from elastocal.mechanics.robot import Robot
     from elastocal.study.in_memory import StudyInMemory
     from elastocal.study.strategies import Strategy
@@ -100,7 +101,7 @@ _TABLE4_QUANTITIES = (
 )
 
 
-def unpack_weights(columns: Mapping[str, np.ndarray]) -> np.ndarray:
+def unpack_weights(columns: Columns) -> np.ndarray:
     """Unpack the weights (1 + replicates, members) of a block of the weights table.
 
     Replicate 0 counts each member once.

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from elastocal.io.data_frames import Frames
     from elastocal.io.storage import TableSchema
     from elastocal.mechanics.robot import Robot
     from elastocal.study.strategies import Strategy
@@ -62,7 +63,7 @@ def read_frames(
     }
 
 
-def concatenate_robots(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+def concatenate_robots(frames: Frames) -> pd.DataFrame:
     """Join the tables of all robots, with the name of the robot as first column."""
     import pandas as pd
 
@@ -89,7 +90,8 @@ def add_slugs(frame: pd.DataFrame, slugs: Mapping[str, str]) -> pd.DataFrame:
 
 
 def collect_settings(job: Job, *excluded: str) -> dict[str, Any]:
-    """Parameters of a rule, without those that every rule has and the excluded ones."""
+    """Collect the parameters of a rule, without those that every rule has and without the
+    excluded ones."""
     return {
         name: value
         for name, value in job.params.items()

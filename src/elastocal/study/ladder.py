@@ -35,10 +35,11 @@ from elastocal.study.schemas import LADDER
 from elastocal.study.simulation import draw_measurement_noise
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Sequence
 
     import pandas as pd
 
+    from elastocal.io.data_frames import Frames
     from elastocal.mechanics.robot import Robot
     from elastocal.study.in_memory import StudyInMemory
     from elastocal.study.simulation import Experiments
@@ -339,7 +340,7 @@ def _fit_ladder(robot: Robot, columns: np.ndarray, deflection: np.ndarray) -> La
     return build_ladder(folds, robot.joints, len(robot.links))
 
 
-def build_ladder_table(ladders: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+def build_ladder_table(ladders: Frames) -> pd.DataFrame:
     """Error of one data set on test configurations, by number of link springs or
     `CHOSEN`.
 

@@ -26,9 +26,10 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from elastocal.io.data_frames import Frames
+    from elastocal.io.storage import Columns
     from elastocal.study.in_memory import StudyInMemory
 
-    Frames = Mapping[str, pd.DataFrame]
     PointSets = Mapping[str, Sequence[str]]
 
 # Suffix of a point that is measured a second time in a configuration, with new noise.
@@ -289,7 +290,7 @@ def build_break_even_table(
     budgets: Frames,
     point_sets: PointSets,
     accuracies_um: Sequence[float],
-    weights: Mapping[str, np.ndarray],
+    weights: Columns,
 ) -> pd.DataFrame:
     """Cost of a configuration above which each set of points is cheaper than the first
     one, with its 95 % interval.

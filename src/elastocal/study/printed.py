@@ -25,7 +25,6 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,7 +32,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import stdtr
 
-from elastocal.io.data_frames import read_robot_tables
+from elastocal.io.data_frames import Frames, read_robot_tables
 from elastocal.study.jobs import (
     MICRO,
     MILLI,
@@ -311,7 +310,7 @@ def correct_by_holm(p_values: np.ndarray) -> np.ndarray:
 def build_comparison_table(
     compared: pd.DataFrame,
     studies: pd.DataFrame,
-    initial: Mapping[str, pd.DataFrame],
+    initial: Frames,
     length: int,
 ) -> pd.DataFrame:
     """Judge the printed figures by further studies.

@@ -34,10 +34,11 @@ from elastocal.study.jobs import Job, collect_provenance, load_robot
 from elastocal.study.schemas import DEFLECTIONS, EXPERIMENTS, INITIAL, WEIGHTS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     import pandas as pd
 
+    from elastocal.io.storage import Columns
     from elastocal.mechanics.chain import Chain, MeasuringPoint
     from elastocal.mechanics.robot import Robot
 
@@ -254,7 +255,7 @@ def make_prefix_index(
     }
 
 
-def list_data_sets(columns: Mapping[str, np.ndarray]) -> np.ndarray:
+def list_data_sets(columns: Columns) -> np.ndarray:
     """List the numbers (sets,) of the data sets of a block; rows of a data set are
     adjacent."""
     numbers = columns["data_set"]
@@ -273,7 +274,7 @@ def pack_experiments(
     return columns | _component_columns(WRENCH_NAMES, experiments.wrench)
 
 
-def unpack_experiments(columns: Mapping[str, np.ndarray]) -> Experiments:
+def unpack_experiments(columns: Columns) -> Experiments:
     """Unpack the experiments of a block."""
     joints = sum(name[0] == "q" for name in columns)
     angles = [f"q{j}" for j in range(1, joints + 1)]
@@ -282,7 +283,7 @@ def unpack_experiments(columns: Mapping[str, np.ndarray]) -> Experiments:
     )
 
 
-def unpack_deflections(columns: Mapping[str, np.ndarray]) -> np.ndarray:
+def unpack_deflections(columns: Columns) -> np.ndarray:
     """Unpack the deflections (sets, configurations, 6) of a block."""
     return _stack_components(columns, COMPONENT_NAMES)
 
@@ -302,14 +303,12 @@ def _component_columns(
     return {name: values[..., k].ravel() for k, name in enumerate(names)}
 
 
-def _count_configurations(columns: Mapping[str, np.ndarray]) -> int:
+def _count_configurations(columns: Columns) -> int:
     """Number of configurations in each data set of a block."""
     return int(columns["configuration"].max()) + 1
 
 
-def _stack_components(
-    columns: Mapping[str, np.ndarray], names: Sequence[str]
-) -> np.ndarray:
+def _stack_components(columns: Columns, names: Sequence[str]) -> np.ndarray:
     """Stack columns of a block to an array (sets, configurations, components)."""
     configurations = _count_configurations(columns)
     components = [columns[name].reshape(-1, configurations) for name in names]
@@ -317,7 +316,7 @@ def _stack_components(
 
 
 def simulate_blocks(
-    experiments: Iterable[Mapping[str, np.ndarray]], robot: Robot, wrench_at: str
+    experiments: Iterable[Columns], robot: Robot, wrench_at: str
 ) -> Iterator[dict[str, np.ndarray | str]]:
     """Simulate deflections without noise; yields one block for each block of experiments
     and each measuring point."""
@@ -518,7 +517,7 @@ def summarize_initial(job: Job) -> None:
     write_table(job.output.initial, INITIAL, blocks, describe_provenance(job.params))
 
 
-def _summarize_block(block: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _summarize_block(block: Columns) -> dict[str, np.ndarray]:
     """Columns of the initial table from a block of deflections."""
     sets = list_data_sets(block)
     return {

@@ -4,13 +4,14 @@ joints fixed at the estimates of an earlier stage)."""
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable
 
+    from elastocal.io.documents import Document
     from elastocal.mechanics.chain import Chain
 
 
@@ -66,13 +67,13 @@ class Strategy:
         return self.stages[-1].fixed or tuple(sorted(identified))
 
 
-def strategy_from_document(document: Mapping[str, Any]) -> Strategy:
+def strategy_from_document(document: Document) -> Strategy:
     """Make a strategy from its file, where joints count from 1.
 
     The document is checked by ``schemas/strategy.yaml``.
     """
 
-    def joints(stage: Mapping[str, Any], key: str) -> tuple[int, ...]:
+    def joints(stage: Document, key: str) -> tuple[int, ...]:
         return tuple(joint - 1 for joint in stage.get(key, ()))
 
     stages = [

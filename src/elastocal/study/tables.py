@@ -26,6 +26,8 @@ from elastocal.study.simulation import compute_statistics, draw_bootstrap_weight
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    from elastocal.io.data_frames import Frames
+    from elastocal.io.storage import Columns
     from elastocal.mechanics.robot import Robot
 
 
@@ -124,9 +126,7 @@ def build_table1(robots: Mapping[str, Robot]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def build_table2(
-    initial: Mapping[str, pd.DataFrame], weights: Mapping[str, np.ndarray]
-) -> pd.DataFrame:
+def build_table2(initial: Frames, weights: Columns) -> pd.DataFrame:
     """Table 2: end-effector deviation before calibration, over all configurations of all
     data sets.
 

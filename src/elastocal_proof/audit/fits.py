@@ -473,15 +473,14 @@ def iterate_equilibrium(
 
 
 def check_residuals(run: FinishedRun, file: str, campaign: str) -> Iterator[Finding]:
-    """Residuals of positions of sampled rows, by the declared model and with the
+    """Residuals of positions of sampled rows, before the calibration and with the
     effects found: measured less MuJoCo's."""
     audited = read_audited_campaign(run, campaign)
     frame = run.table(file).query("not gross_error")
     if audited is None:
         return
     rows = frame.iloc[run.pick(file, len(frame))]
-    declared = next(m for m in audited.models if m is None or m.kind == "declared")
-    for state, model in (("before", declared), ("after", audited.models[-1])):
+    for state, model in (("before", audited.models[0]), ("after", audited.models[-1])):
         if model is not None:
             names = [f"{state}_{name}" for name in COMPONENTS[:3]]
             residuals = frame.loc[~frame["held_out"], names].to_numpy()

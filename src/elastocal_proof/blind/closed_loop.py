@@ -309,7 +309,7 @@ def run_closed_loop(
     -------
     dict
         One row for each wanted pose and model, with the columns of
-        `schemas.build_closed_loop_schema`.
+        `schemas.CLOSED_LOOP`.
     """
     robot = measure_robot(robot_file, effect, seed, slips=slips)
     diagnosis = robot.diagnosis
@@ -513,7 +513,7 @@ def close_loop(job: Any) -> None:
     )
     write_table(
         job.output.moved,
-        schemas.build_closed_loop_schema(read_robot(robot).joints),
+        schemas.CLOSED_LOOP.for_joints(read_robot(robot).joints),
         blocks,
         describe_provenance(params, **job.wildcards),
     )
@@ -719,7 +719,7 @@ def summarize_closed_loop(job: Any) -> None:
         job.params.robots, job.input.moved, job.input.robots, strict=True
     ):
         joints = read_robot(Path(robot_file)).joints
-        schema = schemas.build_closed_loop_schema(joints)
+        schema = schemas.CLOSED_LOOP.for_joints(joints)
         tables[robot] = read_frame(table_path, schema)
     errors = compute_case_errors(tables)
     write_csv(job.output.errors, errors)

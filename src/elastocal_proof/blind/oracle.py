@@ -129,7 +129,7 @@ def fit_oracle(
     if not defects:
         # Without an effect the declared model is the right one, and the verdict has its
         # errors.
-        return _describe_outcome([], 1.0, verdict["heldout"]["before"])
+        return _describe_outcome([], 1.0, verdict["heldout"]["declared"])
     case, held_out = read_cases(folder, robots_folder)
     noise = parse_noise(verdict).without_pose_error
     declared = fit_declared_model(case.model, case.observations, noise)
@@ -156,7 +156,7 @@ def fit_oracle(
     _, heldout, _ = compare_held_out_errors(
         [Step("oracle", "declared", fitted)], case, held_out, outside, seed
     )
-    return _describe_outcome(candidates, p_value, to_document(heldout.before))
+    return _describe_outcome(candidates, p_value, to_document(heldout.declared))
 
 
 def list_variants(

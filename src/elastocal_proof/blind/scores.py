@@ -223,14 +223,14 @@ def _describe_errors(verdict: Document) -> dict[str, Any]:
             "adopted": False,
             "worse": False,
         }
-    before = heldout["before"]["rms_m"]
+    declared = heldout["declared"]["rms_m"]
     after = heldout["after"]["rms_m"]
     std_error = heldout["reduction_std_error"]
     return {
-        "before_rms_m": before,
+        "before_rms_m": declared,
         "after_rms_m": after,
         "adopted": any(effect["adopted"] for effect in verdict["effects"]),
-        "worse": bool(1.0 - after / before + _STD_ERRORS * std_error < 0.0),
+        "worse": bool(1.0 - after / declared + _STD_ERRORS * std_error < 0.0),
     }
 
 

@@ -93,7 +93,7 @@ def summarize_figures(
         for figure in plan["figures"]
         for row in _list_figure_rows(plan, figure, tables, seed)
     ]
-    # A table with a robot that was tuned on proves nothing as a whole.
+    # A table proves nothing if one of its robots was used for tuning.
     robots = PROOF if set(cases.robots) == {PROOF} else TUNED
     return pd.DataFrame(rows).assign(robots=robots)
 

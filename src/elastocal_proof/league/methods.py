@@ -28,9 +28,10 @@ from elastocal.errors import InputError
 from elastocal.fitting.least_squares import Fit
 from elastocal.fitting.model import Case, build_case
 from elastocal.fitting.noise import estimate_noise, fit_declared_model
+from elastocal.io.documents import Document
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.origin import describe_provenance
-from elastocal.io.storage import read_table, write_table
+from elastocal.io.storage import Columns, read_table, write_table
 from elastocal.loop.diagnosis_tables import refit_step, serialize_diagnosis
 from elastocal.loop.loading import read_described_campaign
 from elastocal.loop.schemas import build_measurements_schema
@@ -45,7 +46,6 @@ from elastocal.validation.held_out import compute_position_residuals
 from elastocal.validation.transfer import transfer_fit
 from elastocal_proof.league.schemas import ENTRIES, FOLDS, MECHANISMS
 
-Columns = Mapping[str, np.ndarray]
 # Splits: held-out poses are drawn at random, are a block of joint space, or are those
 # of another session of the same robot.
 RANDOM = "random"
@@ -71,7 +71,7 @@ class DataSet:
         Columns (P,) of `deal_folds`.
     """
 
-    descriptions: Mapping[str, Any]
+    descriptions: Document
     columns: Columns
     folds: Columns
 
@@ -171,7 +171,7 @@ def split_rounds(
         yield int(number), data.build_case(fold != number), [held_out]
 
 
-def parse_method(description: Mapping[str, Any], name: str, source: str) -> Method:
+def parse_method(description: Document, name: str, source: str) -> Method:
     """Parse a method of a configuration.
 
     Parameters

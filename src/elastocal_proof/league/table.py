@@ -11,6 +11,7 @@ import pandas as pd
 
 from elastocal.campaigns.campaign import group_equal_rows
 from elastocal.counting import format_count
+from elastocal.io.data_frames import Frames
 from elastocal.random_streams import open_stream
 from elastocal.residual_model.selection import NORMAL_QUANTILE
 from elastocal.validation.held_out import (
@@ -81,7 +82,7 @@ def compare_methods(
 
 
 def _compare_round(
-    predictions: Mapping[str, pd.DataFrame],
+    predictions: Frames,
     reference: str,
     draws: Sequence[np.random.Generator],
 ) -> Iterator[dict[str, Any]]:
@@ -130,7 +131,7 @@ def _compute_coverage(entries: pd.DataFrame) -> float:
 
 
 def summarize_mechanisms(
-    mechanisms: Mapping[str, pd.DataFrame],
+    mechanisms: Frames,
     robots: Mapping[str, Sequence[str]],
     folds: int,
 ) -> pd.DataFrame:

@@ -95,7 +95,8 @@ _LOAD = (0.0, 1.0)
 KINDS: dict[str, Kind] = {
     "joint_offset": Kind("rad", 3e-4, _any_joint, laws.joint_offset),
     "link_geometry": Kind("m", 3e-4, _any_joint, laws.link_geometry),
-    # A wrong wavelength, with which the frame of the base was measured too.
+    # The wavelength of the laser is wrong, and the frame of the base was measured with
+    # the same error.
     "tracker_scale": Kind(
         "1", 2e-5, _nowhere, partial(laws.set_instrument_error, "tracker", "scale")
     ),

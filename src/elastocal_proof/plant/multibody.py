@@ -613,8 +613,8 @@ def find_distinguishable_weights(arm: Arm) -> dict[tuple[int, ...], int | None]:
     for (link,) in list_flexible_links(arm):
         centre = 0.5 * arm.links[link].vector_m
         joints = find_loaded_joints(LinkMass(link, 1.0, tuple(centre)))
-        # Take the first of the links that load the same joints, and two links at most:
-        # the hand's weight is like a tool's.
+        # Of the links that load the same joints, take only the first. Take two links at
+        # most, because the weight of the hand acts like that of a tool.
         if joints and joints[-1] == link and len(link_of) < 2:
             link_of[joints] = link
     link_of.setdefault(find_loaded_joints(*arm.masses), None)
