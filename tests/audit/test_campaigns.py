@@ -95,7 +95,7 @@ def test_a_simulated_campaign_is_drawn_again_and_no_measured_one(drawn):
         (DRAWN, "repeat", lambda v: v + 1, "visits of hand"),
         (TRAINING, "pose", lambda v: 2, "no pose is fitted and held out"),
         (TRAINING, "row", lambda v: 1, "every row of the campaign once"),
-        (TRAINING, "z", lambda v: v + 1e-6, "positions as measured"),
+        (TRAINING, "z", lambda v: v + 1e-6, "angles, loads and positions as measured"),
     ],
 )
 def test_an_altered_value_does_not_hold(drawn, file, column, change, checked):
