@@ -12,7 +12,7 @@ from synthetic import make_states
 
 from elastocal.application.accuracy import (
     compute_length_quantiles,
-    compute_uncorrected_errors_m,
+    compute_uncorrected_errors,
     inflate_to_held_out_errors,
     predict_campaign_accuracy,
     predict_errors,
@@ -89,14 +89,16 @@ def test_a_misplaced_base_is_an_error_only_if_the_base_is_known(fanuc):
     turn = np.array([0.0, 0.0, -1e-3])
     shift = position @ Rotation.from_rotvec(turn).as_matrix().T - position
     differences = np.concatenate([shift, np.tile(turn, (60, 1))], axis=1)
-    errors_if_known = compute_uncorrected_errors_m(
+    errors_if_known, turns = compute_uncorrected_errors(
         with_scope(calibrated, unknown_base=False), position, rotation, differences
     )
-    errors_if_unknown = compute_uncorrected_errors_m(
+    errors_if_unknown, placed_turns = compute_uncorrected_errors(
         with_scope(calibrated, unknown_base=True), position, rotation, differences
     )
     lever = np.linalg.norm(position[:, :2], axis=1)
     np.testing.assert_allclose(errors_if_known, 1e-3 * lever, rtol=1e-2)
+    np.testing.assert_allclose(turns, 1e-3)
+    assert np.mean(placed_turns**2) < np.mean(turns**2)
     # The placement cannot absorb the springs, which are not in `differences`.
     assert np.mean(errors_if_unknown**2) < np.mean(errors_if_known**2)
 

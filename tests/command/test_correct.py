@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from analysed_robots import ROBOTS
+from scipy.spatial.transform import Rotation
 
 from elastocal.application.calibrated import compute_nominal_poses, predict_poses
 from elastocal.campaigns import campaign_folder
@@ -190,3 +191,51 @@ def test_targets_replace_a_file_of_the_user_with_force_alone(
     assert output.read_text() == "mine\n"
     assert elastocal(*correct_arguments, "--force").exit_code == 0
     assert elastocal(*correct_arguments).exit_code == 0
+
+
+def test_a_path_of_the_controller_leads_to_the_same_targets(
+    elastocal, correct_arguments, path, output, tmp_path
+):
+    """In mm, degrees and KUKA's angles A, B, C, with semicolons and decimal commas."""
+    assert elastocal(*correct_arguments).exit_code == 0
+    expected = pd.read_csv(output)
+    poses = pd.read_csv(path)
+    rotation = Rotation.from_rotvec(poses[["rx", "ry", "rz"]])
+    euler = rotation.as_euler("ZYX", degrees=True)
+    table = pd.DataFrame(
+        np.hstack([1e3 * poses[["x", "y", "z"]], euler]),
+        columns=["X [mm]", "Y [mm]", "Z [mm]", "A [deg]", "B [deg]", "C [deg]"],
+    )
+    other = tmp_path / "kuka.csv"
+    table.to_csv(other, sep=";", decimal=",", index=False)
+    arguments = ["correct", correct_arguments[1], other, "--output", output]
+    result = elastocal(*arguments, "--rotation", "euler:ZYX")
+    assert result.exit_code == 0, result.exception
+    targets = pd.read_csv(output)
+    np.testing.assert_allclose(targets[JOINTS], expected[JOINTS], atol=1e-9)
+
+
+def test_poses_that_are_not_reached_are_left_out_with_partial_alone(
+    elastocal, refusal, correct_arguments, path, output
+):
+    poses = pd.read_csv(path)
+    poses.loc[3, "x"] += 6.0
+    poses.to_csv(path, index=False)
+    arguments = (*correct_arguments, "--format", "krl")
+    message = refusal(*arguments)
+    assert "line 5 is unreachable" in message and "--partial" in message
+    assert not output.exists()
+    result = elastocal(*arguments, "--partial")
+    assert result.exit_code == 1
+    answer = join_lines(result.stderr)
+    assert "! 7 of 8 targets corrected" in answer
+    assert "! not corrected: line 5 is unreachable" in answer
+    assert "predicted orientation error there" in answer
+    targets = pd.read_csv(output)
+    assert targets["status"].tolist().count("unreachable") == 1
+    assert targets[JOINTS].notna().all(axis=1).tolist() == [
+        status != "unreachable" for status in targets["status"]
+    ]
+    program = output.with_suffix(".src").read_text()
+    assert program.count("PTP {") == 7
+    assert "left out of the path: line 5 is unreachable" in program

@@ -102,7 +102,7 @@ A_RAIL = robot_of("Tx(q1) Rz(q2) [A]")
         ("q1,A_x,A_y,A_z", {}, None, ["no column x, y, z", "not yet used: A_x"]),
         (
             "q1,x,y,z,A,B,C,E1,E2,E3",
-            {"rotation": "euler:ZYX"},
+            {"rotation": "euler:XYZ"},
             None,
             ["no column e1", "--column e1=NAME; not yet used: A, B"],
         ),

@@ -6,6 +6,7 @@ from analysed_robots import analysed
 from scipy.spatial.transform import Rotation
 from support import refused
 
+from elastocal.exchange.pose_table import TableOptions
 from elastocal.exchange.target_path import read_target_path, read_target_path_for
 
 HEADER = "x,y,z,rx,ry,rz"
@@ -99,3 +100,82 @@ def test_joint_angles_in_degrees_are_refused(tmp_path):
         ).start[0, 0]
         == 3.3
     )
+
+
+# The first pose of ROWS in millimetres and degrees, as controllers of these makers state
+# it: moving axes z, y, x; fixed axes x, y, z; a quaternion.
+FIRST = Rotation.from_rotvec([0.1, 0.2, 0.3])
+ABC = FIRST.as_euler("ZYX", degrees=True)
+WPR = FIRST.as_euler("xyz", degrees=True)
+QUATERNION = FIRST.as_quat(scalar_first=True)
+
+
+@pytest.mark.parametrize(
+    ("header", "orientation", "options"),
+    [
+        ("X;Y;Z;A;B;C", ABC, {"rotation": "euler:ZYX"}),
+        ("X;Y;Z;W;P;R", WPR, {"rotation": "euler:xyz"}),
+        ("X;Y;Z;rz;ry;rx", ABC, {"rotation": "euler:ZYX"}),
+        ("X;Y;Z;qw;qx;qy;qz", QUATERNION, {}),
+        (
+            "X;Y;Z;q1;q2;q3;q4",
+            QUATERNION,
+            {"columns": {f"q{axis}": f"q{i}" for i, axis in enumerate("wxyz", 1)}},
+        ),
+    ],
+)
+def test_a_path_in_millimetres_and_degrees_is_read_as_its_controller_states_it(
+    tmp_path, header, orientation, options
+):
+    cells = [
+        f"{value:.9f}".replace(".", ",") for value in (1000, 200, 500, *orientation)
+    ]
+    path = write_path(tmp_path, header, [";".join(cells)])
+    stated = {"units": {"lengths": "mm", "angles": "deg"}} | options
+    targets = read_target_path(path, 6, TableOptions(**stated))
+    np.testing.assert_allclose(targets.position, [[1.0, 0.2, 0.5]])
+    np.testing.assert_allclose(targets.rotation[0], FIRST.as_matrix(), atol=1e-9)
+    assert targets.start is None
+
+
+@pytest.mark.parametrize(
+    ("header", "options", "words"),
+    [
+        ("X;Y;Z;A;B;C", {}, ["no orientation", "--rotation euler:ZYX"]),
+        ("x;y;z;rx;ry;rz", {}, ["unknown notation", "--rotation vector"]),
+        (
+            "x;y;z;rx;ry;rz",
+            {"rotation": "vector", "units": {"angles": "deg"}},
+            ["no unit of 'x'", "--lengths mm"],
+        ),
+        (
+            "x;y;z;rx;ry;rz",
+            {"rotation": "vector", "units": {"lengths": "mm"}},
+            ["no unit of 'rx'", "--angles deg"],
+        ),
+    ],
+)
+def test_units_and_notations_of_another_table_are_asked_for(
+    tmp_path, header, options, words
+):
+    path = write_path(tmp_path, header, ["1000;200;500;1;2;3"])
+    with refused(path, "", *words):
+        read_target_path(path, 6, TableOptions(**options))
+
+
+def test_a_column_that_no_target_has_can_be_left_out(tmp_path):
+    path = write_path(tmp_path, HEADER + ",Nr", [row + ",1" for row in ROWS])
+    with refused(path, "line 1", "the unknown column 'Nr'", "--ignore 'Nr'"):
+        read_target_path(path, 6)
+    assert len(read_target_path(path, 6, TableOptions(ignore=["Nr"]))) == 2
+
+
+def test_poses_are_selected_with_their_loads_postures_and_lines(tmp_path):
+    header = HEADER + ",fx,fy,fz,q1"
+    rows = [f"{row},{load},0,0,{load}" for load, row in enumerate(ROWS, 1)]
+    path = read_target_path(write_path(tmp_path, header, rows), 1)
+    second = path.select(np.array([False, True]))
+    assert second.position.tolist() == [[1.1, 0.2, 0.5]] and second.lines == (3,)
+    assert second.start.tolist() == [[2.0]] and second.load[0, 0] == 2.0
+    unloaded = read_target_path(write_path(tmp_path), 1).select(np.array([True, False]))
+    assert unloaded.start is None and unloaded.load.tolist() == [[0.0] * 6]

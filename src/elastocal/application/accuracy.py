@@ -74,6 +74,8 @@ class ErrorPrediction:
     form_m : (N,) RMS error by the uncertain form of the model.
     error_m : (N,) RMS error by all of these and by effects that no command contains.
     bound_m : (N,) upper bound on each error with `CONFIDENCE`.
+    orientation_rad : (N,) RMS orientation error by the parameters and the repeatability.
+        Nothing is known of the other parts, which positions alone show.
     rms_m, worst_m : (draws,) RMS and maximum over the poses, for simulated robots that
         the fit does not rule out.
     scope : meaning of the errors.
@@ -85,6 +87,7 @@ class ErrorPrediction:
     form_m: np.ndarray
     error_m: np.ndarray
     bound_m: np.ndarray
+    orientation_rad: np.ndarray
     rms_m: np.ndarray
     worst_m: np.ndarray
     scope: Scope
@@ -143,7 +146,7 @@ def predict_errors(
     errors = _merge_chunks(chunks)
     parameter_variance = np.diagonal(errors.parameter_covariance, axis1=1, axis2=2)
     repeat_variance = np.diagonal(errors.repeat_covariance, axis1=1, axis2=2)
-    variance = (parameter_variance + repeat_variance)[:, :3].sum(axis=1)
+    pose_variance = parameter_variance + repeat_variance
     left_out = scope.left_out_m**2
     covered = regression.active & (not scope.contradicted)
     form = np.where(covered, 0.0, scope.form_m**2)
@@ -159,8 +162,11 @@ def predict_errors(
         repeated_m=np.sqrt(repeat_variance[:, :3].sum(axis=1)),
         regression_m=np.sqrt(errors.additional[0]),
         form_m=np.sqrt(form),
-        error_m=np.sqrt(variance + errors.additional[0] + left_out + form),
+        error_m=np.sqrt(
+            pose_variance[:, :3].sum(axis=1) + errors.additional[0] + left_out + form
+        ),
         bound_m=np.sqrt(quantile**2 + left_out),
+        orientation_rad=np.sqrt(pose_variance[:, 3:].sum(axis=1)),
         rms_m=np.sqrt(mean_square + left_out + drawn_form),
         worst_m=np.sqrt(
             errors.largest_square
@@ -354,13 +360,13 @@ def compute_length_quantiles(covariance: np.ndarray) -> np.ndarray:
     return np.sqrt(gammaincinv(shape, CONFIDENCE) * mean / shape)
 
 
-def compute_uncorrected_errors_m(
+def compute_uncorrected_errors(
     calibrated: CalibratedRobot,
     position: np.ndarray,
     rotation: np.ndarray,
     differences: np.ndarray,
-) -> np.ndarray:
-    """Compute the position errors of an uncorrected robot after its best placement.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the errors of an uncorrected robot after its best placement.
 
     Parameters
     ----------
@@ -371,12 +377,12 @@ def compute_uncorrected_errors_m(
 
     Returns
     -------
-    (N,) errors, m.
+    position_m, orientation_rad : (N,) errors.
     """
     scope = calibrated.scope
     columns = compute_placement_columns(scope, position, rotation)
     errors = differences - columns @ scope.absorbed_before
-    return np.linalg.norm(errors[:, :3], axis=1)
+    return np.linalg.norm(errors[:, :3], axis=1), np.linalg.norm(errors[:, 3:], axis=1)
 
 
 def select_campaign_commands(

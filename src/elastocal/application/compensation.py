@@ -85,6 +85,16 @@ class Correction:
     error_after: np.ndarray
     status: np.ndarray
 
+    def select(self, chosen: np.ndarray) -> Correction:
+        """Select poses by an (N,) bool array."""
+        return Correction(
+            self.joint_angles[chosen],
+            self.uncorrected[chosen],
+            self.error_before[chosen],
+            self.error_after[chosen],
+            self.status[chosen],
+        )
+
 
 @dataclass(frozen=True)
 class _NominalTargets:

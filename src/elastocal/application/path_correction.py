@@ -12,7 +12,7 @@ import numpy as np
 
 from elastocal.application.accuracy import (
     ErrorPrediction,
-    compute_uncorrected_errors_m,
+    compute_uncorrected_errors,
     predict_errors,
 )
 from elastocal.application.calibrated import (
@@ -48,16 +48,46 @@ _LINES_NAMED = 5
 
 
 @dataclass(frozen=True)
+class Outcome:
+    """Which wanted poses of a file are corrected.
+
+    Attributes
+    ----------
+    poses : all N poses of the file.
+    status : (N,) of str, "ok" or why a pose is not corrected.
+    """
+
+    poses: TargetPath
+    status: np.ndarray
+
+    @property
+    def is_corrected(self) -> np.ndarray:
+        """(N,) bool, poses that are corrected."""
+        return np.asarray(self.status == OK)
+
+    def describe_failures(self) -> str:
+        """Name the first few lines that are not corrected, with the reasons; empty if
+        there are none."""
+        failures = [
+            f"line {self.poses.lines[row]} is {self.status[row]}"
+            for row in np.flatnonzero(~self.is_corrected)
+        ]
+        return list_first(failures, _LINES_NAMED)
+
+
+@dataclass(frozen=True)
 class CorrectedPath:
     """Joint targets for N wanted poses, all of which are reached, and their errors.
 
     Attributes
     ----------
     calibrated : the robot.
+    outcome : all poses of the file, of which these N are corrected.
     wanted : the poses.
     wrench : (N, 6) loads, N and N m; zero if the file has none.
     correction : joint targets.
-    uncorrected_error_m : (N,) predicted errors of uncorrected targets.
+    uncorrected_error_m, uncorrected_turn_rad : (N,) predicted errors of position and
+        orientation of uncorrected targets.
     prediction : predicted errors of the corrected targets.
     is_extrapolated : (N,) bool, joint angles or loads beyond those that were fitted.
     status : (N,) of str, "ok" or why no error bound is stated.
@@ -65,10 +95,12 @@ class CorrectedPath:
     """
 
     calibrated: CalibratedRobot
+    outcome: Outcome
     wanted: TargetPath
     wrench: np.ndarray
     correction: Correction
     uncorrected_error_m: np.ndarray
+    uncorrected_turn_rad: np.ndarray
     prediction: ErrorPrediction
     is_extrapolated: np.ndarray
     status: np.ndarray
@@ -84,6 +116,15 @@ class CorrectedPath:
         """Number of targets in words."""
         return format_count(len(self.wanted), "target")
 
+    @property
+    def share(self) -> str:
+        """Number of targets in words, of those in the file if these are more."""
+        all_poses = len(self.outcome.poses)
+        if len(self.wanted) == all_poses:
+            return self.count
+        number = format_integer(len(self.wanted))
+        return f"{number} of {format_count(all_poses, 'target')}"
+
 
 def correct_path(
     calibrated: CalibratedRobot,
@@ -91,6 +132,7 @@ def correct_path(
     source: str | Path,
     *,
     allow_large_steps: bool = False,
+    partial: bool = False,
 ) -> CorrectedPath:
     """Correct the targets of a path and predict their errors.
 
@@ -101,17 +143,25 @@ def correct_path(
     source : file of the poses, for messages.
     allow_large_steps : whether joints may move farther from target to target than
         `compute_allowed_steps`.
+    partial : whether poses that cannot be corrected are left out. Then a step goes from
+        the pose before them to the pose behind them.
 
     Raises
     ------
     InputError
         A pose is not reached, or not in the stated posture; or a step is too large.
     """
-    wrench = np.zeros((len(wanted), 6)) if wanted.wrench is None else wanted.wrench
+    wrench = wanted.load
     correction = find_joint_targets(
         calibrated, wanted.position, wanted.rotation, wrench, wanted.start
     )
-    _check_reached(wanted, correction, source)
+    outcome = Outcome(wanted, correction.status)
+    is_corrected = outcome.is_corrected
+    if not is_corrected.all():
+        _check_outcome(outcome, source, partial=partial)
+        wanted = wanted.select(is_corrected)
+        wrench = wrench[is_corrected]
+        correction = correction.select(is_corrected)
     commands = correction.joint_angles
     large_steps = find_large_steps(
         calibrated.robot, wanted.position, wanted.rotation, commands
@@ -134,10 +184,11 @@ def correct_path(
     )
     return CorrectedPath(
         calibrated,
+        outcome,
         wanted,
         wrench,
         correction,
-        compute_uncorrected_errors_m(
+        *compute_uncorrected_errors(
             calibrated, wanted.position, wanted.rotation, correction.error_before
         ),
         predict_errors(calibrated, commands, wrench, draws=0),
@@ -147,22 +198,17 @@ def correct_path(
     )
 
 
-def _check_reached(
-    wanted: TargetPath, correction: Correction, source: str | Path
-) -> None:
-    """Refuse a path with targets that cannot be corrected."""
-    failures = [
-        f"line {wanted.lines[row]} is {correction.status[row]}"
-        for row in np.flatnonzero(correction.status != OK)
-    ]
-    if failures:
-        raise InputError(
-            source,
-            "",
-            list_first(failures, _LINES_NAMED),
-            "poses that the robot reaches within its limits,"
-            " in the posture that q1..qn state if any",
-        )
+def _check_outcome(outcome: Outcome, source: str | Path, *, partial: bool) -> None:
+    """Refuse a path with poses that cannot be corrected, or one without any other."""
+    if partial and outcome.is_corrected.any():
+        return
+    allowed = (
+        "poses that the robot reaches within its limits, in the posture that q1..qn"
+        " state if any"
+    )
+    if not partial:
+        allowed += "; --partial leaves out those that it does not reach"
+    raise InputError(source, "", outcome.describe_failures(), allowed)
 
 
 def _describe_large_steps(
@@ -189,10 +235,11 @@ def tabulate_targets(path: CorrectedPath) -> pd.DataFrame:
     """Tabulate joint targets, their errors, and the wanted poses and loads.
 
     Returns columns ``q1..qn`` (rad, as the controller reports them), predicted errors in
-    m, ``status``, ``x .. rz``, ``fx .. mz`` and ``q1_uncorrected ..``.
+    m and rad, ``status``, ``x .. rz``, ``fx .. mz`` and ``q1_uncorrected ..``. There is a
+    row for each pose of the file; one that is not corrected has its pose and status
+    alone.
     """
     import pandas as pd
-    from scipy.spatial.transform import Rotation
 
     correction = path.correction
     prediction = path.prediction
@@ -212,16 +259,33 @@ def tabulate_targets(path: CorrectedPath) -> pd.DataFrame:
             + prediction.repeated_m**2
             + prediction.regression_m**2
         ),
+        "predicted_orientation_error_before_rad": path.uncorrected_turn_rad,
+        "predicted_orientation_error_after_rad": prediction.orientation_rad,
         "repeatability_m": prediction.repeated_m,
         "outside_range": path.is_extrapolated,
         "status": path.status,
     }
-    rotation = Rotation.from_matrix(path.wanted.rotation).as_rotvec()
-    wanted = pd.DataFrame(
-        np.hstack([path.wanted.position, rotation, path.wrench]),
+    outcome = path.outcome
+    rows = pd.Index(np.flatnonzero(outcome.is_corrected))
+    tables = [
+        table.set_axis(rows).reindex(range(len(outcome.poses)))
+        for table in (commands, pd.DataFrame(errors), uncorrected)
+    ]
+    tables.insert(2, _tabulate_poses(outcome.poses))
+    targets = pd.concat(tables, axis=1)
+    return targets.fillna({"status": pd.Series(outcome.status)})
+
+
+def _tabulate_poses(poses: TargetPath) -> pd.DataFrame:
+    """Tabulate wanted poses and their loads, ``x .. rz`` and ``fx .. mz``."""
+    import pandas as pd
+    from scipy.spatial.transform import Rotation
+
+    rotation = Rotation.from_matrix(poses.rotation).as_rotvec()
+    return pd.DataFrame(
+        np.hstack([poses.position, rotation, poses.load]),
         columns=["x", "y", "z", "rx", "ry", "rz", *WRENCH_NAMES],
     )
-    return pd.concat([commands, pd.DataFrame(errors), wanted, uncorrected], axis=1)
 
 
 def describe_path_accuracy(path: CorrectedPath) -> list[str]:
@@ -237,10 +301,19 @@ def describe_path_accuracy(path: CorrectedPath) -> list[str]:
     )
     region = "the targets" if has_bound.all() else "the targets with a bound"
     rms = format_millimetres(root_mean_square(path.uncorrected_error_m[has_bound]))
+    turn_before = _format_milliradians(path.uncorrected_turn_rad[has_bound])
+    turn_after = _format_milliradians(prediction.orientation_rad)
     return [
         format_accuracy(prediction.summarize(region)),
         f"uncorrected they would be missed by {rms} RMS",
+        f"predicted orientation error there: {turn_before} RMS uncorrected, {turn_after}"
+        " corrected, by the parameters and the repeatability",
     ]
+
+
+def _format_milliradians(angles_rad: np.ndarray) -> str:
+    """Format the root mean square of angles (N,)."""
+    return f"{1e3 * root_mean_square(angles_rad):.3f} mrad"
 
 
 def describe_regression(path: CorrectedPath, regression: str) -> str:
@@ -263,8 +336,19 @@ def describe_regression(path: CorrectedPath, regression: str) -> str:
 
 
 def describe_path_warnings(path: CorrectedPath) -> list[str]:
-    """Describe large steps, targets without an error bound, and extrapolation."""
+    """Describe poses that are not corrected, large steps, targets without an error
+    bound, extrapolation, and orientations that the correction does not improve."""
     warnings = []
+    failures = path.outcome.describe_failures()
+    if failures:
+        warnings.append(f"not corrected: {failures}")
+    before_rad = root_mean_square(path.uncorrected_turn_rad)
+    after_rad = root_mean_square(path.prediction.orientation_rad)
+    if after_rad > before_rad:
+        warnings.append(
+            "the corrected orientations are less certain than the uncorrected ones are"
+            " wrong: measure orientations, or several reflectors off one line"
+        )
     if path.large_steps:
         robot = path.calibrated.robot
         warnings.append(
@@ -286,7 +370,7 @@ def describe_path_warnings(path: CorrectedPath) -> list[str]:
 
 def describe_program(path: CorrectedPath, campaign: str) -> list[str]:
     """Return the remarks of a robot program with these targets: robot, campaign, day,
-    largest load, and tool."""
+    largest load, tool, and poses of the path that it lacks."""
     robot = path.calibrated.robot
     end = robot.chain.end_effector
     force = math.sqrt((path.wrench[:, :3] ** 2).sum(axis=1).max())
@@ -295,10 +379,13 @@ def describe_program(path: CorrectedPath, campaign: str) -> list[str]:
     if force or moment:
         load = f"force up to {force:.4g} N, moment up to {moment:.4g} N m"
     offset = ", ".join(f"{1e3 * value:.4g}" for value in end.offset_m)
+    failures = path.outcome.describe_failures()
+    left_out = [f"left out of the path: {failures}"] if failures else []
     return [
         f"robot: {robot.name}",
         f"campaign: {campaign}",
         f"date: {date.today().isoformat()}",
         f"load: {load}",
         f"tool: {end.name}, target offset {offset} mm",
+        *left_out,
     ]

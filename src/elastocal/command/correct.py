@@ -6,12 +6,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from typer import Argument, Option
+from typer import Argument, Exit, Option
 
 from elastocal.command.terminal import (
+    AnglesOption,
+    ColumnOption,
+    DecimalOption,
     ForceOption,
+    IgnoreOption,
+    LengthsOption,
+    RotationOption,
+    UnitOption,
     find_workplace,
     load_diagnosed_campaign,
+    parse_pairs,
+    parse_units,
     print_answer,
 )
 from elastocal.errors import InputError
@@ -28,7 +37,8 @@ def correct(
         Path,
         Argument(
             help="CSV of wanted poses: x, y, z in m, rx, ry, rz in rad; fx..fz or"
-            " fx..mz, q1..qn."
+            " fx..mz, q1..qn. Options say what else a table has, such as mm, degrees"
+            " and Euler angles."
         ),
     ],
     *,
@@ -56,6 +66,20 @@ def correct(
             " and 10 degrees.",
         ),
     ] = False,
+    partial: Annotated[
+        bool,
+        Option(
+            "--partial",
+            help="Leave out poses that cannot be corrected, and end with exit code 1.",
+        ),
+    ] = False,
+    angles: AnglesOption = None,
+    lengths: LengthsOption = None,
+    rotation: RotationOption = None,
+    column: ColumnOption = None,
+    ignore: IgnoreOption = None,
+    unit: UnitOption = None,
+    decimal: DecimalOption = None,
     force: ForceOption = False,
 ) -> None:
     """Compute the joint targets that reach the wanted poses.
@@ -78,6 +102,7 @@ def correct(
         describe_path_warnings,
         describe_regression,
     )
+    from elastocal.exchange.pose_table import TableOptions
     from elastocal.exchange.target_path import read_target_path_for
     from elastocal.io.replacement import check_replaceable, note_written_files
 
@@ -90,10 +115,21 @@ def correct(
     check_replaceable(files, inputs, find_workplace(), force=force)
     robot = campaign.calibrated.robot
     axis_names = program.name_axes(robot) if program else ()
-    wanted = read_target_path_for(path, robot)
+    options = TableOptions(
+        decimal=decimal,
+        columns=parse_pairs("--column", column),
+        units=parse_units(unit, angles, lengths),
+        rotation=rotation,
+        ignore=ignore or [],
+    )
+    wanted = read_target_path_for(path, robot, options)
     with console.status("correcting"):
         corrected = correct_path(
-            campaign.calibrated, wanted, path, allow_large_steps=allow_large_steps
+            campaign.calibrated,
+            wanted,
+            path,
+            allow_large_steps=allow_large_steps,
+            partial=partial,
         )
     _write_targets(output, corrected, campaign.name, program, axis_names)
     note_written_files(files, find_workplace())
@@ -109,12 +145,16 @@ def correct(
     details.append(str(output))
     if program:
         details.append(str(program.path))
+    is_complete = bool(corrected.outcome.is_corrected.all())
     print_answer(
-        f"{corrected.count} corrected",
+        f"{corrected.share} corrected",
         details,
         f"elastocal certificate {folder} --tolerance 0.2mm",
         console,
+        passed=is_complete,
     )
+    if not is_complete:
+        raise Exit(1)
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,17 @@ from typer import Argument, Option
 
 from elastocal.command.terminal import (
     MOST_ROWS,
+    AnglesOption,
+    ColumnOption,
+    DecimalOption,
+    IgnoreOption,
+    LengthsOption,
+    RotationOption,
+    UnitOption,
     find_robots_folder,
     format_example,
+    parse_pairs,
+    parse_units,
     print_lines,
 )
 from elastocal.counting import format_count
@@ -131,19 +140,9 @@ def csv(
     folder: Annotated[
         Path, Option(help="Folder of the campaign; measurements.csv goes there.")
     ],
-    angles: Annotated[
-        str | None, Option(help="Unit of angles whose header has none: deg, rad, mrad.")
-    ] = None,
-    lengths: Annotated[
-        str | None, Option(help="Unit of lengths whose header has none: m, mm, um, in.")
-    ] = None,
-    rotation: Annotated[
-        str | None,
-        Option(
-            help="none, vector, quaternion, matrix, homogeneous, euler:ZYX (moving"
-            " axes), euler:xyz (fixed)."
-        ),
-    ] = None,
+    angles: AnglesOption = None,
+    lengths: LengthsOption = None,
+    rotation: RotationOption = None,
     names: Annotated[
         str | None,
         Option(
@@ -152,17 +151,9 @@ def csv(
             " one out.",
         ),
     ] = None,
-    column: Annotated[
-        list[str] | None,
-        Option(help="NAME=HEADER, such as q1=Axis_A1; as often as needed."),
-    ] = None,
-    ignore: Annotated[
-        list[str] | None,
-        Option(help="Header of a column to leave out; as often as needed."),
-    ] = None,
-    unit: Annotated[
-        list[str] | None, Option(help="NAME=UNIT of one column, such as fx=kN.")
-    ] = None,
+    column: ColumnOption = None,
+    ignore: IgnoreOption = None,
+    unit: UnitOption = None,
     target: Annotated[
         list[str] | None,
         Option(
@@ -176,10 +167,7 @@ def csv(
     skip_empty: Annotated[
         bool, Option("--skip-empty", help="Leave out rows without a position.")
     ] = False,
-    decimal: Annotated[
-        Literal["point", "comma"] | None,
-        Option(help="Mark of decimals. Default: found out."),
-    ] = None,
+    decimal: DecimalOption = None,
     encoding: Annotated[
         str | None,
         Option(help="Such as cp1252. Default: UTF-8, or UTF-16 by its mark."),
@@ -217,18 +205,13 @@ def csv(
     from elastocal.io.atomic_writes import write_together
 
     _check_replaceable(folder, force=force)
-    units = _parse_pairs("--unit", unit)
-    if angles:
-        units["angles"] = angles
-    if lengths:
-        units["lengths"] = lengths
     target_name, target_columns = _parse_targets(target or [])
     options = ImportOptions(
         decimal=decimal,
         header=header,
         encoding=encoding,
-        columns=_parse_pairs("--column", column),
-        units=units,
+        columns=parse_pairs("--column", column),
+        units=parse_units(unit, angles, lengths),
         rotation=rotation,
         target=target_name,
         wrench=wrench,
@@ -297,24 +280,13 @@ def _is_filled(path: Path) -> bool:
     return bool(cells.fillna("").map(str.strip).any(axis=None))
 
 
-def _parse_pairs(option: str, texts: list[str] | None) -> dict[str, str]:
-    """Parse options ``NAME=VALUE``, each name once."""
-    pairs: dict[str, str] = {}
-    for text in texts or ():
-        name, _, value = map(str.strip, text.partition("="))
-        if not (name and value) or name in pairs:
-            raise InputError(option, "", repr(text), "NAME=VALUE, each name once")
-        pairs[name] = value
-    return pairs
-
-
 def _parse_targets(texts: list[str]) -> tuple[str | None, dict[str, list[str]]]:
     """Parse the option --target: one name for all rows, or the columns ``NAME=X,Y,Z`` of
     each of several targets in a row."""
     if len(texts) == 1 and "=" not in texts[0]:
         return texts[0], {}
     targets = {}
-    for name, columns in _parse_pairs("--target", texts).items():
+    for name, columns in parse_pairs("--target", texts).items():
         headers = [header.strip() for header in columns.split(",")]
         if len({*headers}) != 3:
             raise InputError(

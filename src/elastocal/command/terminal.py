@@ -8,7 +8,7 @@ import math
 import re
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from typer import Option
 
@@ -53,6 +53,35 @@ ForceOption = Annotated[
         "--force",
         help="Replace files that exist, whoever has written them.",
     ),
+]
+# Options of commands that read tables of other programs.
+AnglesOption = Annotated[
+    str | None, Option(help="Unit of angles whose header has none: deg, rad, mrad.")
+]
+LengthsOption = Annotated[
+    str | None, Option(help="Unit of lengths whose header has none: m, mm, um, in.")
+]
+RotationOption = Annotated[
+    str | None,
+    Option(
+        help="none, vector, quaternion, matrix, homogeneous, euler:ZYX (moving axes),"
+        " euler:xyz (fixed)."
+    ),
+]
+ColumnOption = Annotated[
+    list[str] | None,
+    Option(help="NAME=HEADER, such as q1=Axis_A1; as often as needed."),
+]
+IgnoreOption = Annotated[
+    list[str] | None,
+    Option(help="Header of a column to leave out; as often as needed."),
+]
+UnitOption = Annotated[
+    list[str] | None, Option(help="NAME=UNIT of one column, such as fx=kN.")
+]
+DecimalOption = Annotated[
+    Literal["point", "comma"] | None,
+    Option(help="Mark of decimals. Default: found out."),
 ]
 _SNAKEFILE = "Snakefile"
 # Where a wheel installs the Snakefile, rules and configuration; see `data-files` in
@@ -111,6 +140,30 @@ def parse_numbers(
             f"{count} numbers separated by commas, each up to {largest:g} m",
         )
     return numbers
+
+
+def parse_pairs(option: str, texts: Iterable[str] | None) -> dict[str, str]:
+    """Parse options ``NAME=VALUE``, each name once."""
+    pairs: dict[str, str] = {}
+    for text in texts or ():
+        name, _, value = map(str.strip, text.partition("="))
+        if not (name and value) or name in pairs:
+            raise InputError(option, "", repr(text), "NAME=VALUE, each name once")
+        pairs[name] = value
+    return pairs
+
+
+def parse_units(
+    units: Iterable[str] | None, angles: str | None, lengths: str | None
+) -> dict[str, str]:
+    """Parse the options --unit, --angles and --lengths, see
+    `exchange.pose_table.TableOptions.units`."""
+    stated = parse_pairs("--unit", units)
+    if angles:
+        stated["angles"] = angles
+    if lengths:
+        stated["lengths"] = lengths
+    return stated
 
 
 def format_example(command: str) -> str:

@@ -269,6 +269,16 @@ def find_columns(
     return columns, stated_units
 
 
+def find_euler_columns(text: TextTable, notation: str | None) -> dict[str, str]:
+    """Find the headers of Euler angles, by name, that a controller with this notation
+    calls by letters, such as A, B and C; none if the table lacks one of them."""
+    letters = _VOCABULARY["euler_headers"].get(notation, ())
+    headers = {_simplify(split_unit(header)[0]): header for header in text.columns}
+    if not letters or not headers.keys() >= {*letters}:
+        return {}
+    return {name: headers[letter] for name, letter in zip(EULER, letters, strict=True)}
+
+
 def _recognize_headers(
     text: TextTable, mapped: Mapping[str, str], robot: Robot | None
 ) -> Iterator[_Header]:

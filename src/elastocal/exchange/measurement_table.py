@@ -19,28 +19,28 @@ import numpy as np
 import pandas as pd
 
 from elastocal.campaigns.holdout import number_close_points
-from elastocal.campaigns.measurements import describe_columns
-from elastocal.campaigns.tables import Cells, Dialect, TextTable, read_text_table
+from elastocal.campaigns.tables import Cells, TextTable
 from elastocal.counting import format_count
-from elastocal.errors import InputError, find_text_fault, suggest_names
+from elastocal.errors import InputError, find_text_fault
 from elastocal.exchange.column_names import (
-    HOMOGENEOUS_MATRICES,
     POSITION,
-    QUATERNIONS,
-    TRANSLATION,
     VECTOR,
-    convert_to_rotation_vectors,
     find_columns,
+    find_euler_columns,
     find_joints,
     find_lengths,
     find_rotation,
     find_scales,
     find_units,
     has_position,
-    is_name,
-    list_rotation_columns,
-    read_units,
     recognize_column,
+)
+from elastocal.exchange.pose_table import (
+    PoseTable,
+    TableOptions,
+    check_option_names,
+    read_cells,
+    read_rotation_vectors,
 )
 from elastocal.io.storage import Columns
 from elastocal.io.texts import parse_number
@@ -62,34 +62,22 @@ _Value = TypeVar("_Value")
 
 
 @dataclass(frozen=True)
-class ImportOptions(Dialect):
-    """How a table is read; what is None or absent is recognized, or refused if it is
-    ambiguous.
+class ImportOptions(TableOptions):
+    """How a table of measurements is read.
 
     Attributes
     ----------
-    columns : headers by the names of `column_names`.
-    units : units by the same names; ``angles`` and ``lengths`` for all columns that
-        have no other unit.
-    rotation : notation of the orientations, see `find_rotation`.
     target : name for all rows if no column has it.
     wrench : ``on-robot`` or ``by-robot``: what the forces act on. Forces that the robot
         exerts have their signs changed.
     skip_empty : whether rows without a position are left out.
-    ignore : headers of columns that are left out.
     targets : headers of x, y and z by the names of the targets, if a row holds several.
-    names : names of the columns of a table without a header, in their order.
     """
 
-    columns: Mapping[str, str] = field(default_factory=dict)
-    units: Mapping[str, str] = field(default_factory=dict)
-    rotation: str | None = None
     target: str | None = None
     wrench: str = "on-robot"
     skip_empty: bool = False
-    ignore: Sequence[str] = ()
     targets: Mapping[str, Sequence[str]] = field(default_factory=dict)
-    names: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -113,41 +101,6 @@ class ImportedMeasurements:
     ignored: tuple[str, ...]
     skipped: int
     notes: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class _Layout:
-    """How the columns of a table are understood.
-
-    `text`: the table, one row a target. `columns`: headers by name. `stated_units`:
-    units that headers state, by name. `rotation`: notation of the orientations.
-    """
-
-    text: TextTable
-    columns: dict[str, str]
-    stated_units: dict[str, str]
-    rotation: str
-
-    @property
-    def angles(self) -> list[str]:
-        return find_joints(self.columns)
-
-    @property
-    def position(self) -> tuple[str, ...]:
-        return TRANSLATION if self.rotation == HOMOGENEOUS_MATRICES else POSITION
-
-    @property
-    def orientation(self) -> Sequence[str]:
-        return list_rotation_columns(self.rotation, self.columns)
-
-    @property
-    def wrench(self) -> list[str]:
-        return [name for name in WRENCH_NAMES if name in self.columns]
-
-    @property
-    def with_units(self) -> list[str]:
-        """Names of all columns that must have a unit."""
-        return [*self.angles, *self.position, *self.orientation, *self.wrench]
 
 
 @dataclass(frozen=True)
@@ -178,12 +131,13 @@ def read_measurement_table(
         Something is missing or ambiguous: the error has the option that states it. Or a
         cell is not a number, or not a rotation: the error has its line and column.
     """
-    _check_names(options)
-    text = _read_cells(path, options)
+    check_option_names(options)
+    target_headers = set[str]().union(*options.targets.values())
+    text = read_cells(path, options, target_headers)
     notes = []
     if text.units:
         notes.append(f"units in the row under the header: {len(text.units)}")
-    headers = dict(options.columns)
+    headers = find_euler_columns(text, options.rotation) | dict(options.columns)
     if options.targets:
         text = _split_targets(text, options.targets)
         first_headers = next(iter(options.targets.values()))
@@ -234,42 +188,6 @@ def read_measurement_table(
         (*ignored, *options.ignore),
         len(text.lines) - len(rows),
         (*notes, *optional.notes),
-    )
-
-
-def _check_names(options: ImportOptions) -> None:
-    """Refuse options for columns that cannot be imported."""
-    names = [*options.columns, *(set(options.units) - {"angles", "lengths"})]
-    for name in names:
-        if not is_name(name):
-            examples = [*describe_columns(6), "qw", "e1", "r11", "t11"]
-            raise InputError("--column", "", repr(name), suggest_names(name, examples))
-
-
-def _read_cells(path: str | Path, options: ImportOptions) -> TextTable:
-    """Read the cells of the table, below the first line that looks like a header."""
-    target_headers = set[str]().union(*options.targets.values())
-
-    def is_header(cells: Sequence[str]) -> bool:
-        if target_headers and target_headers <= {*cells}:
-            return True
-        names = {recognize_column(cell)[0] for cell in cells}
-        names |= {name for name, header in options.columns.items() if header in cells}
-        if has_position(names):
-            return True
-        # Joint angles without a position are a header too, so that the error can say
-        # what the table lacks.
-        has_joints = bool(find_joints(name for name in names if name))
-        has_numbers = any(parse_number(cell) is not None for cell in cells)
-        return has_joints and len(cells) > 1 and not has_numbers
-
-    return read_text_table(
-        path,
-        is_header,
-        options,
-        options.ignore,
-        units_in=read_units,
-        names=options.names,
     )
 
 
@@ -330,7 +248,7 @@ def _find_layout(
     headers: Mapping[str, str],
     options: ImportOptions,
     robot: Robot | None,
-) -> _Layout:
+) -> PoseTable:
     """Find out what the columns of a table are; `headers`: those that are stated, by
     name."""
     columns, stated_units = find_columns(text, headers, robot)
@@ -347,12 +265,12 @@ def _find_layout(
                 ),
             )
     rotation = find_rotation(text, columns, options.rotation)
-    layout = _Layout(text, columns, stated_units, rotation)
+    layout = PoseTable(text, columns, stated_units, rotation)
     _check_complete(layout, robot)
     return layout
 
 
-def _check_complete(layout: _Layout, robot: Robot | None) -> None:
+def _check_complete(layout: PoseTable, robot: Robot | None) -> None:
     """Refuse a table without all joint angles of the robot, or without a column that
     its positions or orientations need."""
     path = layout.text.path
@@ -385,7 +303,7 @@ def _check_complete(layout: _Layout, robot: Robot | None) -> None:
             )
 
 
-def _no_angles_error(layout: _Layout, robot: Robot | None, unused: str) -> InputError:
+def _no_angles_error(layout: PoseTable, robot: Robot | None, unused: str) -> InputError:
     """Make the error of a table without joint angles."""
     joint_names = ""
     if robot and robot.joint_names:
@@ -399,7 +317,7 @@ def _no_angles_error(layout: _Layout, robot: Robot | None, unused: str) -> Input
     )
 
 
-def _find_filled_rows(layout: _Layout, *, skip_empty: bool) -> np.ndarray:
+def _find_filled_rows(layout: PoseTable, *, skip_empty: bool) -> np.ndarray:
     """Find the rows that have a position, ndarray of int.
 
     With `skip_empty`, cells such as NaN, - and N/A are empty too. Without it, an empty
@@ -430,7 +348,7 @@ def _find_filled_rows(layout: _Layout, *, skip_empty: bool) -> np.ndarray:
 
 
 def _read_columns(
-    cells: Cells, layout: _Layout, options: ImportOptions
+    cells: Cells, layout: PoseTable, options: ImportOptions
 ) -> dict[str, np.ndarray]:
     """Read pose numbers, joint angles, wrench, position and orientation."""
     table = _number_poses(cells, layout.angles)
@@ -447,25 +365,13 @@ def _read_columns(
     for axis, name in zip(POSITION, layout.position, strict=True):
         table[axis] = cells.numbers(name)
     if layout.orientation:
-        vectors = _read_rotation_vectors(cells, layout)
+        vectors = read_rotation_vectors(cells, layout)
         table |= dict(zip(VECTOR, vectors.T, strict=True))
     return table
 
 
-def _read_rotation_vectors(cells: Cells, layout: _Layout) -> np.ndarray:
-    """Read the orientations as rotation vectors, ndarray (N, 3), rad."""
-    values = cells.matrix(layout.orientation)
-    vectors, is_wrong = convert_to_rotation_vectors(layout.rotation, values)
-    if is_wrong.any():
-        allowed = "a rotation matrix, row by row"
-        if layout.rotation == QUATERNIONS:
-            allowed = "a quaternion of length 1"
-        raise cells.fault(int(np.argmax(is_wrong)), layout.orientation[0], allowed)
-    return vectors
-
-
 def _read_optional_columns(
-    layout: _Layout,
+    layout: PoseTable,
     headers: Mapping[str, str],
     options: ImportOptions,
     rows: np.ndarray,

@@ -3,10 +3,13 @@
 Columns ``x, y, z`` (m) and ``rx, ry, rz`` (rotation vector, rad) of the last measuring
 point in base axes; optionally ``fx .. mz`` (N, N m), its load, or the forces alone if all
 moments are zero; and optionally ``q1 .. qn`` (rad, as the controller reports them), joint
-angles of the posture in which the robot shall reach the pose.
+angles of the posture in which the robot shall reach the pose. A table of another program
+is read as `measurement_table` reads measurements: its units and the notation of its
+orientations must be stated, by headers or by options.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +17,32 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.measurements import LARGEST_ROTATION_RAD
 from elastocal.campaigns.reading import find_degrees
-from elastocal.campaigns.tables import Cells, Dialect, TextTable, read_text_table
+from elastocal.campaigns.tables import Cells, TextTable
 from elastocal.errors import InputError, suggest_names
+from elastocal.exchange.column_names import (
+    NO_ROTATION,
+    POSITION,
+    VECTOR,
+    find_columns,
+    find_euler_columns,
+    find_rotation,
+    find_scales,
+    find_units,
+)
+from elastocal.exchange.pose_table import (
+    PoseTable,
+    TableOptions,
+    check_option_names,
+    read_cells,
+    read_rotation_vectors,
+)
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 
-_POSE = ("x", "y", "z", "rx", "ry", "rz")
+_POSE = (*POSITION, *VECTOR)
+# Units of a table with the names that elastocal writes, separated by commas.
+_USUAL_UNITS = {"lengths": "m", "angles": "rad"}
+_AS_RECOGNIZED = TableOptions()
 # Status of a corrected target.
 OK = "ok"
 # Status of a corrected target without a bound on its error; the reason follows.
@@ -51,64 +74,124 @@ class TargetPath:
     def __len__(self) -> int:
         return len(self.position)
 
+    @property
+    def load(self) -> np.ndarray:
+        """(N, 6) loads, N and N m; zero if the file has none."""
+        return np.zeros((len(self), 6)) if self.wrench is None else self.wrench
 
-def read_target_path(path: str | Path, joints: int) -> TargetPath:
+    def select(self, chosen: np.ndarray) -> "TargetPath":
+        """Select poses by an (N,) bool array."""
+        return TargetPath(
+            self.position[chosen],
+            self.rotation[chosen],
+            None if self.start is None else self.start[chosen],
+            None if self.wrench is None else self.wrench[chosen],
+            tuple(self.lines[row] for row in np.flatnonzero(chosen)),
+        )
+
+
+def read_target_path(
+    path: str | Path,
+    joints: int,
+    options: TableOptions = _AS_RECOGNIZED,
+    robot: Robot | None = None,
+) -> TargetPath:
     """Read a file of target poses.
 
     Parameters
     ----------
     path : CSV file
     joints : number of joints of the robot
+    options : how a table of another program is read
+    robot : robot whose joints columns may be named after
 
     Raises
     ------
     InputError
-        A column is missing, unknown or incomplete, a cell is not a number, or no arm
-        reaches a pose.
+        A column is missing, unknown or incomplete, a unit or notation is not stated, a
+        cell is not a number, or no arm reaches a pose.
     """
+    check_option_names(options)
     angles = tuple(f"q{joint}" for joint in range(1, joints + 1))
-    text = read_text_table(path, lambda _: True, Dialect("comma", "point"))
-    _check_columns(text, angles)
-    cells = text.cells({name: name for name in text.columns}, {})
-    pose = cells.matrix(_POSE)
-    position = pose[:, :3]
-    rotation_vector = pose[:, 3:]
+    table, options = _find_poses(read_cells(path, options), angles, options, robot)
+    text = table.text
+    units = find_units(
+        text,
+        table.columns,
+        table.with_units,
+        table.stated_units,
+        options.units,
+        robot,
+    )
+    cells = text.cells(table.columns, find_scales(units))
+    position = cells.matrix(table.position)
+    rotation_vector = read_rotation_vectors(cells, table)
     _check_size(text, "position", np.abs(position).max(axis=1), _FARTHEST_M, "metres")
     allowed = "a rotation vector in rad, not degrees"
     angle = np.linalg.norm(rotation_vector, axis=1)
     _check_size(text, "turn", angle, LARGEST_ROTATION_RAD, allowed)
-    has_moments = bool(set(WRENCH_NAMES[3:]) & set(text.columns))
+    has_moments = bool({*WRENCH_NAMES[3:]} & {*table.columns})
     wrench_names = WRENCH_NAMES if has_moments else WRENCH_NAMES[:3]
-    wrench = _read_all_or_none(text, cells, wrench_names)
+    wrench = _read_all_or_none(table, cells, wrench_names)
     if wrench is not None:
         wrench = np.pad(wrench, ((0, 0), (0, 6 - wrench.shape[1])))
     rotation = Rotation.from_rotvec(rotation_vector).as_matrix()
-    start = _read_all_or_none(text, cells, angles)
+    start = _read_all_or_none(table, cells, angles)
     return TargetPath(position, rotation, start, wrench, text.lines)
 
 
-def _check_columns(text: TextTable, angles: tuple[str, ...]) -> None:
-    """Refuse a table without a pose, or with a column that no target has."""
-    header = f"line {text.dialect.header}"
-    for name in _POSE:
-        if name not in text.columns:
+def _find_poses(
+    text: TextTable,
+    angles: Sequence[str],
+    options: TableOptions,
+    robot: Robot | None,
+) -> tuple[PoseTable, TableOptions]:
+    """Find out what the columns of a table are; refuse one that is missing or that no
+    target has.
+
+    Returns the table, and the options with the units of a table that elastocal writes.
+    """
+    mapped = find_euler_columns(text, options.rotation) | dict(options.columns)
+    columns, stated_units = find_columns(text, mapped, robot)
+    usual_names = (*_POSE, *WRENCH_NAMES, *angles)
+    used_columns = {name: columns[name] for name in usual_names if name in columns}
+    is_usual = text.dialect.separator == "comma" and all(
+        name == header and name not in stated_units
+        for name, header in used_columns.items()
+    )
+    if is_usual and not (options.columns or options.units or options.rotation):
+        options = replace(options, units=_USUAL_UNITS, rotation="vector")
+    rotation = find_rotation(text, columns, options.rotation)
+    table = PoseTable(text, columns, stated_units, rotation)
+    _check_columns(table, (*WRENCH_NAMES, *angles))
+    return table, options
+
+
+def _check_columns(table: PoseTable, optional: Sequence[str]) -> None:
+    """Refuse a table without a pose, or with a column that no target has; `optional`:
+    names of the columns that it may have beside the pose."""
+    text = table.text
+    key = f"line {text.dialect.header}"
+    allowed = (
+        f"{', '.join(_POSE)}: position in m and rotation vector in rad, base axes,"
+        " separated by commas; or of another table --lengths mm --angles deg --rotation"
+        " euler:ZYX and such"
+    )
+    if table.rotation == NO_ROTATION:
+        raise InputError(text.path, key, "no orientation", allowed)
+    pose = (*table.position, *table.orientation)
+    for name in pose:
+        if name not in table.columns:
+            raise InputError(text.path, key, f"no column {name!r}", allowed)
+    names = (*pose, *optional)
+    headers = [table.columns[name] for name in names if name in table.columns]
+    for header in text.columns:
+        if header not in headers:
             raise InputError(
                 text.path,
-                header,
-                f"no column {name!r}",
-                (
-                    f"{', '.join(_POSE)}: position in m and rotation vector in rad, base"
-                    " axes, separated by commas"
-                ),
-            )
-    allowed_names = (*_POSE, *WRENCH_NAMES, *angles)
-    for name in text.columns:
-        if name not in allowed_names:
-            raise InputError(
-                text.path,
-                header,
-                f"the unknown column {name!r}",
-                suggest_names(name, allowed_names),
+                key,
+                f"the unknown column {header!r}",
+                f"--ignore {header!r}, or {suggest_names(header, names)}",
             )
 
 
@@ -122,28 +205,33 @@ def _check_size(
             text.path,
             f"line {text.lines[row]}",
             f"a {quantity} of {size[row]:g}",
-            f"{unit}, {largest:.3g} at most",
+            f"{unit}, {largest:.3g} at most; --lengths, --angles and --rotation state"
+            " what else it is",
         )
 
 
 def _read_all_or_none(
-    text: TextTable, cells: Cells, names: tuple[str, ...]
+    table: PoseTable, cells: Cells, names: tuple[str, ...]
 ) -> np.ndarray | None:
     """Read columns, ndarray (N, len(names)); None if the table has none of them."""
-    present = [name for name in names if name in text.columns]
-    missing = [name for name in names if name not in text.columns]
+    present = [name for name in names if name in table.columns]
+    missing = [name for name in names if name not in table.columns]
     if not present:
         return None
     if missing:
+        text = table.text
         problem = f"{', '.join(present)} without {', '.join(missing)}"
         header = f"line {text.dialect.header}"
         raise InputError(text.path, header, problem, "all of them or none")
     return cells.matrix(names)
 
 
-def read_target_path_for(path: str | Path, robot: Robot) -> TargetPath:
-    """Read a file of target poses for a robot; joint angles in degrees are refused too."""
-    targets = read_target_path(path, robot.joints)
+def read_target_path_for(
+    path: str | Path, robot: Robot, options: TableOptions = _AS_RECOGNIZED
+) -> TargetPath:
+    """Read a file of target poses for a robot; joint angles in degrees are refused too
+    unless they are stated to be so."""
+    targets = read_target_path(path, robot.joints, options, robot)
     if targets.start is None:
         return targets
     in_degrees = find_degrees(targets.start, robot)
