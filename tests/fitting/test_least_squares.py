@@ -627,3 +627,16 @@ def test_a_fit_of_more_states_than_fit_in_memory_is_the_same_and_keeps_no_jacobi
         np.testing.assert_allclose(
             white, fit.whiten(plain), rtol=0, atol=1e-5 * np.abs(white).max()
         )
+
+
+def test_a_slow_linear_fixed_point_is_found_in_as_many_steps_as_it_has_unknowns():
+    """Plain iteration would need 1,000 steps for the same error."""
+    contraction = np.diag([0.99, 0.95, 0.5])
+    fixed_point = np.array([[0.1, -0.2, 0.3]])
+    rounds = []
+    argument = np.zeros((1, 3))
+    for _ in range(5):
+        value = fixed_point + (argument - fixed_point) @ contraction
+        rounds.append((argument, value))
+        argument = least_squares._extrapolate_fixed_point(rounds)
+    np.testing.assert_allclose(argument, fixed_point, atol=1e-9)

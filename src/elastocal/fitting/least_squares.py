@@ -50,6 +50,9 @@ if TYPE_CHECKING:
 # registration has converged.
 _MAX_REGISTRATION_ROUNDS = 200
 _REGISTRATION_TOLERANCE_M = 1e-9
+# Number of earlier rounds from which the next one is extrapolated. A target has three
+# unknowns, so that more rounds than these tell little.
+_REGISTRATION_MEMORY = 6
 # Upper bound on the Gauss-Newton steps of a fit.
 _MAX_STEPS = 30
 # Upper bound on the halvings of a step. If a 64th of it does not lower the objective,
@@ -770,9 +773,6 @@ def register_to_poses(
     """
     sessions = np.unique(observations.states.session)
     session = np.searchsorted(sessions, observations.states.session[observations.state])
-    members_of_session = [
-        np.flatnonzero(session == number) for number in range(len(sessions))
-    ]
     target = observations.target
     unknown_targets = [
         index for index in np.unique(target) if model.targets[index].offset_m is None
@@ -782,25 +782,29 @@ def register_to_poses(
     )
     rotation = np.tile(np.eye(3), (len(sessions), 1, 1))
     position = np.zeros((len(sessions), 3))
-    alternating = model.fitted_frames and unknown_targets
-    for _ in range(_MAX_REGISTRATION_ROUNDS if alternating else 1):
+    rounds: list[tuple[np.ndarray, np.ndarray]] = []
+    is_alternating = model.fitted_frames and unknown_targets
+    for _ in range(_MAX_REGISTRATION_ROUNDS if is_alternating else 1):
         if model.fitted_frames:
             points = nominal_position + np.einsum(
                 "mij,mj->mi", nominal_rotation, offsets[target]
             )
-            for number, members in enumerate(members_of_session):
+            for number in range(len(sessions)):
+                members = session == number
                 rotation[number], position[number] = _align_points(
                     points[members], observations.position[members]
                 )
-        in_base = np.einsum(
-            "mji,mj->mi", rotation[session], observations.position - position[session]
+        in_base = _rotate_back(
+            rotation[session], observations.position - position[session]
         )
-        local = np.einsum("mji,mj->mi", nominal_rotation, in_base - nominal_position)
         previous = offsets.copy()
+        on_point = _rotate_back(nominal_rotation, in_base - nominal_position)
         for index in unknown_targets:
-            offsets[index] = local[target == index].mean(axis=0)
+            offsets[index] = on_point[target == index].mean(axis=0)
         if np.abs(offsets - previous).max() < _REGISTRATION_TOLERANCE_M:
             break
+        rounds = [*rounds[-_REGISTRATION_MEMORY:], (previous, offsets)]
+        offsets = _extrapolate_fixed_point(rounds)
     placement = Estimate(
         tuple(sessions.tolist()),
         rotation,
@@ -812,6 +816,38 @@ def register_to_poses(
     )
     start = placement.with_effects(model.effects)
     return replace(start, coefficients=model.nominal_coefficients)
+
+
+def _rotate_back(rotation: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Vectors (M, 3) in the axes that rotations (M, 3, 3) turn into base axes."""
+    return np.einsum("mji,mj->mi", rotation, vectors)
+
+
+def _extrapolate_fixed_point(
+    rounds: list[tuple[np.ndarray, np.ndarray]],
+) -> np.ndarray:
+    """Next argument of a fixed-point iteration by Anderson's method [1]_.
+
+    Of the affine combinations of the last arguments it takes the one whose change would
+    be smallest if the function were linear. The alternation of frames and offsets is
+    close to linear, and alone it converges slowly where the measurements hardly tell
+    one from the other.
+
+    Parameters
+    ----------
+    rounds : arguments and values of the function, arrays of equal shape, oldest first
+
+    References
+    ----------
+    .. [1] Walker and Ni, Anderson acceleration for fixed-point iterations, SIAM J. Numer.
+       Anal. 49, 2011.
+    """
+    values = np.array([value.ravel() for _, value in rounds])
+    arguments = np.array([argument.ravel() for argument, _ in rounds])
+    changes = values - arguments
+    weights = np.linalg.lstsq(np.diff(changes, axis=0).T, changes[-1], rcond=None)[0]
+    extrapolated = values[-1] - np.diff(values, axis=0).T @ weights
+    return extrapolated.reshape(rounds[-1][1].shape)
 
 
 def _align_points(
