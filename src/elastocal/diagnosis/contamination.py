@@ -52,6 +52,8 @@ _RIDGE = 1e-3
 # anything at a level of one percent.
 _SIGN_DRAWS = 999
 _LEAST_POSES = 8
+# Lower bound on the spread of a joint's angles, for joints that stand still.
+_LEAST_SPREAD_RAD = 1e-9
 
 
 @dataclass(frozen=True)
@@ -286,45 +288,53 @@ class _Linearization:
         )
 
     def test_group(self, wrong: np.ndarray) -> float | None:
-        """Test whether wrong rows agree with each other.
-
-        Joint errors of poses are compared with those of all other wrong poses, near
-        ones more than far ones. Accidents have either sign with the same probability
-        and independently, so that random signs give the distribution of the sum of all
-        cosines [1]_.
+        """Test whether the joint errors of wrong poses agree with each other.
 
         Parameters
         ----------
         wrong
             (M,) of bool.
-
-        References
-        ----------
-        .. [1] Good, Permutation, Parametric and Bootstrap Tests of Hypotheses, 2005.
         """
         observations = self.design.whitened.observations
-        poses = np.unique(observations.cluster[wrong])
-        if len(poses) < _LEAST_POSES:
-            return None
-        directions = []
-        angles = []
-        for pose in poses.tolist():
+        errors = []
+        states = []
+        for pose in np.unique(observations.cluster[wrong]).tolist():
             chosen = wrong & (observations.cluster == pose)
-            error = self._solve_joint_error(chosen)
-            directions.append(error / np.linalg.norm(error))
-            first = observations.state[np.argmax(chosen)]
-            angles.append(observations.states.joint_angles[first])
-        cosines = np.array(directions) @ np.array(directions).T
-        spread = np.maximum(np.std(observations.states.joint_angles, axis=0), 1e-9)
-        scaled = np.array(angles) / spread
-        squares = ((scaled[:, None] - scaled) ** 2).mean(axis=2)
-        agreement = cosines * (1.0 + np.exp(-0.5 * squares))
-        np.fill_diagonal(agreement, 0.0)
-        signs = np.random.default_rng(len(poses)).choice(
-            [-1.0, 1.0], (_SIGN_DRAWS, len(poses))
-        )
-        drawn = ((signs @ agreement) * signs).sum(axis=1)
-        return float((1 + (drawn >= agreement.sum()).sum()) / (1 + _SIGN_DRAWS))
+            errors.append(self._solve_joint_error(chosen))
+            states.append(observations.state[np.argmax(chosen)])
+        if len(errors) < _LEAST_POSES:
+            return None
+        angles = observations.states.joint_angles
+        spread = np.maximum(angles.std(axis=0), _LEAST_SPREAD_RAD)
+        return compute_agreement_p_value(np.array(errors), angles[states] / spread)
+
+
+def compute_agreement_p_value(errors: np.ndarray, states: np.ndarray) -> float:
+    """Compute the probability that errors which are accidents agree as well.
+
+    The statistic is the sum of the cosines between all errors, those of near states
+    with more weight. Accidents have either sign with the same probability, and
+    independently, so that random signs give its distribution exactly [1]_.
+
+    Parameters
+    ----------
+    errors
+        (k, n), joint error of each pose.
+    states
+        (k, d), in units of their spread over the campaign.
+
+    References
+    ----------
+    .. [1] Good, Permutation, Parametric and Bootstrap Tests of Hypotheses, 2005.
+    """
+    directions = errors / np.linalg.norm(errors, axis=1, keepdims=True)
+    squares = ((states[:, None] - states) ** 2).mean(axis=2)
+    agreement = (directions @ directions.T) * (1.0 + np.exp(-0.5 * squares))
+    np.fill_diagonal(agreement, 0.0)
+    draws = np.random.default_rng(len(errors))
+    signs = draws.choice([-1.0, 1.0], (_SIGN_DRAWS, len(errors)))
+    drawn = ((signs @ agreement) * signs).sum(axis=1)
+    return float((1 + (drawn >= agreement.sum()).sum()) / (1 + _SIGN_DRAWS))
 
 
 def _sample_rows(
