@@ -29,7 +29,7 @@ as the ``origin`` of a URDF, from the base frame of the controller.
 
 import math
 import re
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from functools import reduce
 from pathlib import Path
@@ -329,31 +329,30 @@ def _describe(
     return notes
 
 
-@dataclass(frozen=True)
-class _DhRow:
-    """Elementary transforms of a row, as names with amounts (m, rad), `before` and
-    `behind` the motion of its joint."""
-
-    before: list[tuple[str, float]]
-    behind: list[tuple[str, float]]
+# Elementary transforms as names with amounts, m and rad.
+_Transforms = list[tuple[str, float]]
 
 
-def _split_rows(rows: np.ndarray, *, modified: bool) -> Iterator[_DhRow]:
+def _split_rows(
+    rows: np.ndarray, *, modified: bool
+) -> Iterator[tuple[_Transforms, _Transforms]]:
+    """Split each row into the transforms before and behind the motion of its joint."""
     for theta, d, a, alpha in rows.tolist():
         across = [("Tx", a), ("Rx", alpha)]
         if modified:
-            yield _DhRow([*across, ("Rz", theta)], [("Tz", d)])
+            yield [*across, ("Rz", theta)], [("Tz", d)]
         else:
-            yield _DhRow([("Rz", theta)], [("Tz", d), *across])
+            yield [("Rz", theta)], [("Tz", d), *across]
 
 
 def _format_rows(rows: np.ndarray, *, modified: bool) -> list[str]:
     """Format a table in the chain notation, row by row."""
     tokens: list[str] = []
-    for joint, row in enumerate(_split_rows(rows, modified=modified), 1):
-        tokens += format_tokens(row.before)
+    split_rows = _split_rows(rows, modified=modified)
+    for joint, (before, behind) in enumerate(split_rows, 1):
+        tokens += format_tokens(before)
         tokens.append(f"Rz(q{joint})")
-        tokens += format_tokens(row.behind)
+        tokens += format_tokens(behind)
     return tokens
 
 
@@ -362,9 +361,9 @@ def _format_short_chain(rows: np.ndarray, *, modified: bool) -> list[str]:
     that is closest to the joint frame before."""
     # Fixed transforms before, between and behind the joints, which turn about z.
     fixed = [np.eye(4)]
-    for row in _split_rows(rows, modified=modified):
-        fixed[-1] = fixed[-1] @ _multiply(row.before)
-        fixed.append(_multiply(row.behind))
+    for before, behind in _split_rows(rows, modified=modified):
+        fixed[-1] = fixed[-1] @ _multiply(before)
+        fixed.append(_multiply(behind))
     tokens: list[str] = []
     slide = 0.0
     for joint, transform in enumerate(fixed[:-1], 1):
@@ -377,7 +376,7 @@ def _format_short_chain(rows: np.ndarray, *, modified: bool) -> list[str]:
     return [*tokens, *format_displacement(last)]
 
 
-def _multiply(transforms: Iterable[tuple[str, float]]) -> np.ndarray:
+def _multiply(transforms: _Transforms) -> np.ndarray:
     """Multiply elementary transforms, ndarray (4, 4)."""
     return reduce(
         np.matmul,
