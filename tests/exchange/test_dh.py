@@ -272,8 +272,12 @@ def test_a_calibrated_arm_has_the_poses_of_its_origins(tmp_path, order):
     ("described", "key", "fragments"),
     [
         ({"hash": "x"}, "kinematics", ["no link"]),
-        ({"shoulder": {"x": 1}}, "kinematics.shoulder", ["found x;", "roll"]),
-        ({"shoulder": dict.fromkeys(KEYS, "a")}, "kinematics.shoulder.x", ["'a'"]),
+        ({"shoulder": {"x": 1}}, "line 2, kinematics.shoulder.y", ["found nothing"]),
+        (
+            {"shoulder": dict.fromkeys(KEYS, "a")},
+            "line 3, kinematics.shoulder.pitch",
+            ["'a'"],
+        ),
         (
             dict.fromkeys(("shoulder", "forearm"), dict.fromkeys(KEYS, 0)),
             "kinematics",

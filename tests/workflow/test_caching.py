@@ -265,10 +265,11 @@ def test_the_import_closure_is_what_a_script_loads(scripts, unstarted):
         names = [file.relative_to(unstarted.folder).as_posix() for file in files]
         # What reads tables into frames is loaded when it is called.
         later = {"src/elastocal/io/data_frames.py"}
-        # A table that a module reads beside it counts as the module does.
-        assert ("src/elastocal/diagnosis/settings.json" in names) == (
-            "src/elastocal/diagnosis/settings.py" in names
-        )
+        # A data file that a module reads beside it counts as the module does.
+        for stem, suffix in (("diagnosis/settings", "json"), ("study/schemas", "csv")):
+            assert (f"src/elastocal/{stem}.{suffix}" in names) == (
+                f"src/elastocal/{stem}.py" in names
+            )
         assert sorted({*json.loads(done.stdout)} | (later & {*names})) == [
             name for name in names if name.endswith(".py")
         ], script_and_step

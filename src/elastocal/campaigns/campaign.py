@@ -100,6 +100,15 @@ class Measurements:
         return Measurements(**selected)
 
 
+def join_measurements(first: Measurements, second: Measurements) -> Measurements:
+    """Join the measurements of one campaign, one after the other."""
+    joined: dict[str, Any] = {
+        name: None if array is None else np.concatenate([array, getattr(second, name)])
+        for name, array in vars(first).items()
+    }
+    return Measurements(**joined)
+
+
 @dataclass(frozen=True)
 class Campaign:
     """A campaign that was checked as a whole; the schema of ``campaign.yaml`` explains

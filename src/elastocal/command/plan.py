@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -158,7 +157,7 @@ def plan(
         candidates = find_allowed_candidates(survey, cell, number, seed)
         chosen = choose_plan(survey, candidates, poses, held_out, seed)
     sentences = _describe_plan(survey, chosen, sensor)
-    rows = _write_campaign(folder, robot, _PlannedCell(survey, cell, chosen), sentences)
+    rows = _write_campaign(folder, robot, survey, cell, chosen, sentences)
     print_answer(
         f"{format_count(poses, 'pose')} to fit and {held_out} held out, of"
         f" {len(candidates.joint_angles):,} that the cell allows:"
@@ -307,20 +306,19 @@ def _describe_plan(survey: Survey, chosen: Plan, sensor: Sensor) -> list[str]:
     ]
 
 
-@dataclass(frozen=True)
-class _PlannedCell:
-    """A plan with what it was made for."""
-
-    survey: Survey
-    cell: Cell
-    chosen: Plan
-
-
 def _write_campaign(
-    folder: Path, robot_file: Path, planned: _PlannedCell, sentences: list[str]
+    folder: Path,
+    robot_file: Path,
+    survey: Survey,
+    cell: Cell,
+    chosen: Plan,
+    sentences: list[str],
 ) -> int:
     """Write the campaign to fill in: descriptions, a sheet whose measurement columns are
-    empty, and its pages with sentences. Returns the number of rows."""
+    empty, and its pages with sentences and pictures of the cell and of the poses.
+
+    Returns the number of rows.
+    """
     import yaml
 
     from elastocal.application.planning.sheet import (
@@ -329,38 +327,30 @@ def _write_campaign(
     )
     from elastocal.campaigns.campaign import DOCUMENT
     from elastocal.campaigns.measurements import CSV
+    from elastocal.figures.arms import draw_plan, draw_poses
+    from elastocal.figures.style import save_all
     from elastocal.io.atomic_writes import write_text, write_together
     from elastocal.io.data_frames import write_csv
     from elastocal.io.documents import LARGEST_BYTES
     from elastocal.io.texts import read_text
     from elastocal.report.plan_pages import collect_plan_facts
+    from elastocal.report.typesetting import compile_document
 
-    survey = planned.survey
-    table = build_sheet(survey, planned.chosen)
-    facts = collect_plan_facts(survey, planned.chosen, table, sentences)
-    document = build_campaign_document(folder.name, ROBOT, survey, planned.chosen)
+    table = build_sheet(survey, chosen)
+    facts = collect_plan_facts(survey, chosen, table, sentences)
+    document = build_campaign_document(folder.name, ROBOT, survey, chosen)
     with write_together(folder, (ROBOT, CSV, SHEET, PICTURE, DOCUMENT)) as partial:
         write_text(partial / ROBOT, read_text(robot_file, LARGEST_BYTES))
         write_csv(partial / CSV, table)
-        _write_pages(partial, planned, facts)
+        figures = {"overview": draw_plan(survey.robot, cell, chosen)}
+        for page, figure in enumerate(draw_poses(survey.robot, chosen)):
+            figures[f"poses{page}"] = figure
+        with tempfile.TemporaryDirectory() as scratch:
+            pictures = save_all(figures, scratch).values()
+            compile_document(partial / SHEET, "plan.typ", {"facts": facts}, pictures)
+            shutil.copyfile(f"{scratch}/overview.png", partial / PICTURE)
         text = yaml.safe_dump(
             document, sort_keys=False, default_flow_style=None, width=120
         )
         write_text(partial / DOCUMENT, text)
     return len(table)
-
-
-def _write_pages(folder: Path, planned: _PlannedCell, facts: dict[str, object]) -> None:
-    """Write the sheet to print, with pictures of the cell and of the poses."""
-    from elastocal.figures.arms import draw_plan, draw_poses
-    from elastocal.figures.style import save_all
-    from elastocal.report.typesetting import compile_document
-
-    robot = planned.survey.robot
-    figures = {"overview": draw_plan(robot, planned.cell, planned.chosen)}
-    for page, figure in enumerate(draw_poses(robot, planned.chosen)):
-        figures[f"poses{page}"] = figure
-    with tempfile.TemporaryDirectory() as scratch:
-        pictures = save_all(figures, scratch).values()
-        compile_document(folder / SHEET, "plan.typ", {"facts": facts}, pictures)
-        shutil.copyfile(f"{scratch}/overview.png", folder / PICTURE)

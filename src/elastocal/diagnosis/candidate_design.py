@@ -30,6 +30,7 @@ from elastocal.fitting.observations import Observations, select_spread_poses
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from elastocal.diagnosis.gross_error_terms import GrossErrorBasis
     from elastocal.diagnosis.settings import Settings
     from elastocal.effects.conditions import Conditions
     from elastocal.effects.protocol import Candidate, Shape
@@ -171,6 +172,7 @@ class CandidateDesign:
     discrepancies : competitors of the candidates
     max_pose_error_rad : largest size of the pose error to be considered
     precomputed : results that are kept after the rows were released
+    gross_errors : gross errors that compete with the candidates
     """
 
     reference_fit: Fit
@@ -181,6 +183,7 @@ class CandidateDesign:
     discrepancies: list[Discrepancy]
     max_pose_error_rad: float
     precomputed: _Precomputed | None = None
+    gross_errors: GrossErrorBasis | None = None
 
     @property
     def without_rows(self) -> CandidateDesign:
@@ -193,8 +196,14 @@ class CandidateDesign:
 
     @cached_property
     def terms(self) -> tuple[ModelTerm, ...]:
-        """Terms of candidates and discrepancies, in the order of their columns."""
-        return build_terms(self.tried.values(), self.discrepancies, self.settings)
+        """Terms of candidates, discrepancies and gross errors, in the order of their
+        columns."""
+        terms = build_terms(self.tried.values(), self.discrepancies, self.settings)
+        if self.gross_errors:
+            first_column = sum(len(term.columns) for term in terms)
+            scales = len(self.settings.scales)
+            terms += self.gross_errors.build_terms(first_column, scales)
+        return terms
 
     @property
     def priors(self) -> tuple[np.ndarray, np.ndarray]:
@@ -229,9 +238,13 @@ class CandidateDesign:
         ]
         for discrepancy in self.discrepancies:
             displacements += discrepancy.displacement(conditions)
+        jacobian = rows.candidates.jacobian
+        if self.gross_errors:
+            displacements += self.gross_errors.displacement(jacobian.shape[2])
+            jacobian = self.gross_errors.extend_jacobian(jacobian)
         candidates = FactoredSensitivities.of(
             displacements,
-            rows.candidates.jacobian,
+            jacobian,
             rows.candidates.state,
             len(self.whitened.observations.states),
             np.concatenate([term.sizes for term in self.terms]),

@@ -18,6 +18,7 @@ from elastocal.diagnosis import model_averaging, refit, verdict
 from elastocal.diagnosis.alarm import run_alarm_test
 from elastocal.diagnosis.candidate_design import build_candidate_design, refine_shapes
 from elastocal.diagnosis.centre_prior import choose_centre_prior
+from elastocal.diagnosis.contamination import find_wrong_rows
 from elastocal.diagnosis.effect_estimates import find_oversized_effects
 from elastocal.diagnosis.fitted_subset import (
     FittedSubset,
@@ -29,7 +30,7 @@ from elastocal.diagnosis.grid_ends import warn_of_grid_ends
 from elastocal.diagnosis.gross_errors import (
     OutlierTest,
     describe_gross_errors,
-    find_gross_errors,
+    describe_standing_out,
 )
 from elastocal.diagnosis.search import screen_terms, search_models
 from elastocal.diagnosis.training_verdict import TrainingResult, state_training_verdict
@@ -236,6 +237,8 @@ class _SettledRows:
         Rows that are fitted.
     outliers
         Last test of all rows.
+    standing_out
+        (N,) of bool, rows that are far from the model and stay.
     evidence
         Result of the last search; None if the data are at fault.
     fitted
@@ -244,6 +247,7 @@ class _SettledRows:
 
     subset: FittedSubset
     outliers: OutlierTest
+    standing_out: np.ndarray
     evidence: Evidence | None
     fitted: Fit
 
@@ -281,7 +285,7 @@ def diagnose(
     report(f"declared model fitted to {count}")
     context = _Context(replace(case, model=subset.case.model), settings, seed, report)
     outliers = OutlierTest.none(len(subset.kept), case.model.rows)
-    rows = _SettledRows(subset, outliers, None, subset.declared)
+    rows = _SettledRows(subset, outliers, outliers.gross, None, subset.declared)
     if not data_faults:
         rows = _settle_rows(context, subset)
     result = _choose_model(context, rows, data_faults)
@@ -328,10 +332,10 @@ def _search_and_judge_rows(
     # Therefore no set of rows comes back.
     readmitted = start.readmitted.copy()
     for number in range(start.number, settings.gross_error_rounds):
-        outliers = find_gross_errors(
-            fitted, subset.noise, case.campaign.measurements, subset.kept, settings
+        outliers = find_wrong_rows(
+            fitted, subset.noise, case, (subset.kept, readmitted), settings
         )
-        readmitted |= ~subset.kept & ~outliers.gross
+        readmitted |= _find_readmitted(outliers, subset.kept)
         remaining = ~outliers.gross | readmitted
         is_last = number + 1 == settings.gross_error_rounds
         if is_last or (remaining == subset.kept).all():
@@ -340,10 +344,10 @@ def _search_and_judge_rows(
         # before starting another search.
         sample = sample_for_search(case, case.select(remaining), settings)
         fitted = _refit_from(fitted, sample, fitted.noise, INTERMEDIATE_TOLERANCE)
-        outliers = find_gross_errors(
-            fitted, subset.noise, case.campaign.measurements, remaining, settings
+        outliers = find_wrong_rows(
+            fitted, subset.noise, case, (remaining, readmitted), settings
         )
-        readmitted |= ~remaining & ~outliers.gross
+        readmitted |= _find_readmitted(outliers, remaining)
         previous = subset
         subset = fit_subset(case, ~outliers.gross | readmitted, settings, previous)
         if subset is previous:
@@ -364,7 +368,15 @@ def _search_and_judge_rows(
             search = _restart_search(subset, evidence, fitted)
             return _RowRound(number + 1, subset, readmitted, search)
         fitted = refitted
-    return _SettledRows(subset, outliers, evidence, fitted)
+    standing_out = outliers.distant & subset.kept
+    return _SettledRows(subset, outliers, standing_out, evidence, fitted)
+
+
+def _find_readmitted(outliers: OutlierTest, kept: np.ndarray) -> np.ndarray:
+    """Rows, (N,) of bool, that are not wrong after all: some that were left out, and
+    some that are far from the model, for which an effect is more probable than
+    accidents."""
+    return ~outliers.gross & (~kept | outliers.distant)
 
 
 def _is_shift_negligible(searched: Fit, refitted: Fit) -> bool:
@@ -711,7 +723,7 @@ def _add_effects(
         warnings=(*result.warnings, *filter(None, losses)),
         repeatable=repeatable,
     )
-    return _contradict(result, evidence, context.settings)
+    return _contradict(context, result, evidence, rows.standing_out)
 
 
 def _refit_declared(
@@ -729,14 +741,22 @@ def _refit_declared(
 
 
 def _contradict(
-    result: TrainingResult, evidence: Evidence, settings: Settings
+    context: _Context,
+    result: TrainingResult,
+    evidence: Evidence,
+    rows_standing_out: np.ndarray,
 ) -> TrainingResult:
-    """Withdraw a verdict of adequacy if something contradicts it, and warn."""
+    """Withdraw a verdict of adequacy if something contradicts it, and warn.
+
+    `rows_standing_out`: (N,) of bool, rows that are far from the model and stay.
+    """
+    settings = context.settings
+    standing_out = describe_standing_out(rows_standing_out, context.case.campaign)
     repeatable_warnings = verdict.describe_repeatable_residual(result.repeatable)
     conclusion = evidence.conclusion
     contradictions: list[str] = []
     if conclusion.verdict in (verdict.ADEQUATE, verdict.NOT_TESTABLE):
-        contradictions = repeatable_warnings
+        contradictions = [*repeatable_warnings, *standing_out]
     if conclusion.verdict == verdict.ADEQUATE and not contradictions:
         contradictions = verdict.find_contradictions(
             result.full_model, result.noise, settings
@@ -744,6 +764,7 @@ def _contradict(
     if contradictions:
         conclusion = replace(conclusion, verdict=verdict.UNEXPLAINED)
     warnings = [*contradictions, *result.warnings]
+    warnings += [sentence for sentence in standing_out if sentence not in warnings]
     if not repeatable_warnings:
         warnings += verdict.warn_of_pose_error(
             result.steps[-1].fitted.noise, evidence.design.pose_std_error_rad

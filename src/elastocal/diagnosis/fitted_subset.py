@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.diagnosis.candidate_design import build_candidate_design
-from elastocal.diagnosis.gross_errors import find_gross_errors
+from elastocal.diagnosis.contamination import weigh_gross_errors
+from elastocal.diagnosis.gross_errors import find_extreme_loads, find_gross_errors
 from elastocal.diagnosis.initial_outliers import find_unexplained_observations
 from elastocal.fitting.least_squares import (
     CONVERGENCE_TOLERANCE,
@@ -27,7 +28,6 @@ from elastocal.fitting.observations import (
 )
 
 if TYPE_CHECKING:
-    from elastocal.campaigns.campaign import Measurements
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case
@@ -143,7 +143,7 @@ def sample_for_search(case: Case, subset: Case, settings: Settings) -> Observati
 
 def select_initial_subset(case: Case, settings: Settings) -> FittedSubset:
     """Leave out the rows that neither the declared model nor all candidates together
-    explain.
+    explain, if they are more probably wrong than changed by an effect.
 
     Rows under extreme loads are bad leverage points [1]_: they would pull any fit
     towards themselves. They are left out at first and judged by fits to the other rows.
@@ -167,6 +167,21 @@ def select_initial_subset(case: Case, settings: Settings) -> FittedSubset:
     examined[left_out[np.linspace(0, len(left_out) - 1, count).astype(int)]] = True
     examined[_find_states(case, extreme)] = False
     sample = select_states(case.observations, examined)
+    gross = _find_unexplained_rows(case, subset, sample, settings)
+    subset = fit_subset(case, ~gross, settings, start)
+    # Rows under extreme loads are judged by a model that was found without them.
+    weighed = weigh_gross_errors(
+        subset.declared, subset.noise, case, gross & ~extreme, settings
+    )
+    return fit_subset(case, ~(weighed.gross | (gross & extreme)), settings, subset)
+
+
+def _find_unexplained_rows(
+    case: Case, subset: FittedSubset, sample: Observations, settings: Settings
+) -> np.ndarray:
+    """Find the rows, (N,) of bool, that all candidates together do not explain, in a
+    sample, and that the declared model does not explain elsewhere."""
+    measurements = case.campaign.measurements
     reference = evaluate_as_fit(
         subset.declared.model, sample, subset.noise, subset.declared.estimate
     )
@@ -182,12 +197,11 @@ def select_initial_subset(case: Case, settings: Settings) -> FittedSubset:
     )
     inliers = remove_outlying_repeats(measurements)
     tested = in_sample & np.isin(measurements.row, inliers.row)
-    gross = np.where(
+    return np.where(
         tested,
         match_states_and_targets(measurements, sample, unexplained),
         ~subset.kept,
     )
-    return fit_subset(case, ~gross, settings, start)
 
 
 def _find_states(case: Case, rows: np.ndarray) -> np.ndarray:
@@ -212,19 +226,3 @@ def _leave_out_unpredicted(
         if subset is previous:
             break
     return subset
-
-
-def find_extreme_loads(measurements: Measurements, settings: Settings) -> np.ndarray:
-    """Find the rows under forces far beyond those of most loaded rows.
-
-    Returns
-    -------
-    ndarray
-        (N,) of bool; none if there are too many to be exceptions.
-    """
-    force = np.linalg.norm(measurements.wrench[:, :3], axis=1)
-    loaded = force > 0
-    if not loaded.any():
-        return loaded
-    extreme = force > settings.extreme_load * np.quantile(force[loaded], 0.75)
-    return extreme & (extreme.mean() <= settings.gross_error_share)

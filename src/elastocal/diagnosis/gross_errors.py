@@ -42,6 +42,8 @@ if TYPE_CHECKING:
 _SCALE_QUANTILES = (0.5, 0.75)
 # Number of extrapolated rows from which their own median distance is a reference.
 _MIN_EXTRAPOLATED = 5
+# Number of poses from which on rows that are far from the model and stay contradict it.
+_MIN_STANDING_OUT = 2
 # Number of gross errors with a sentence of their own among the warnings; the table of
 # residuals lists all of them.
 _MAX_WARNINGS = 10
@@ -59,18 +61,33 @@ class OutlierTest:
         (N,), from the prediction by the other rows, in robust standard deviations.
     gross
         (N,) of bool, rows that are gross errors.
+    distant
+        (N,) of bool, rows beyond the critical distance; those that are no gross errors
+        are more probably explained by an effect.
+    probability
+        (N,), that a row is wrong.
     """
 
     residual: np.ndarray
     distance: np.ndarray
     gross: np.ndarray
+    distant: np.ndarray
+    probability: np.ndarray
 
     @classmethod
     def none(cls, count: int, components: int) -> OutlierTest:
         """The outcome for rows that are not tested: no gross errors."""
+        none = np.zeros(count, bool)
         return cls(
-            np.zeros((count, components)), np.zeros(count), np.zeros(count, bool)
+            np.zeros((count, components)), np.zeros(count), none, none, np.zeros(count)
         )
+
+    @classmethod
+    def by_distance(
+        cls, residual: np.ndarray, distance: np.ndarray, distant: np.ndarray
+    ) -> OutlierTest:
+        """The outcome if every distant row is wrong."""
+        return cls(residual, distance, distant, distant, distant.astype(float))
 
 
 def flag_outliers(
@@ -148,6 +165,22 @@ def compute_critical_distance(
     return float(np.sqrt(components * fdtri(components, scale_freedom, 1.0 - level)))
 
 
+def find_extreme_loads(measurements: Measurements, settings: Settings) -> np.ndarray:
+    """Find the rows under forces far beyond those of most loaded rows.
+
+    Returns
+    -------
+    ndarray
+        (N,) of bool; none if there are too many to be exceptions.
+    """
+    force = np.linalg.norm(measurements.wrench[:, :3], axis=1)
+    loaded = force > 0
+    if not loaded.any():
+        return loaded
+    extreme = force > settings.extreme_load * np.quantile(force[loaded], 0.75)
+    return extreme & (extreme.mean() <= settings.gross_error_share)
+
+
 def find_gross_errors(
     fitted: Fit,
     noise: Noise,
@@ -180,7 +213,7 @@ def find_gross_errors(
     )
     distance = rows.compute_distances(rows.estimate_uncertainty(fitted), kept)
     scaled, gross = flag_outliers(distance, fitted.model.rows, kept, settings)
-    return OutlierTest(rows.residual, scaled, gross)
+    return OutlierTest.by_distance(rows.residual, scaled, gross)
 
 
 def find_held_out_gross_errors(
@@ -229,7 +262,7 @@ def find_held_out_gross_errors(
         factor = max(factor, median / float(chi_quantile(0.5, model.rows)))
     limit = factor * compute_critical_distance(len(scaled), model.rows, settings)
     gross &= ~extrapolated | (scaled > limit)
-    return OutlierTest(rows.residual, scaled, gross)
+    return OutlierTest.by_distance(rows.residual, scaled, gross)
 
 
 def describe_gross_errors(
@@ -266,6 +299,28 @@ def describe_gross_errors(
             )
         )
     return gross_errors
+
+
+def describe_standing_out(standing_out: np.ndarray, campaign: Campaign) -> list[str]:
+    """Describe rows that are far from the model and stay, in one sentence; none if they
+    are of a single pose, which may be one accident that is too small to be called so.
+
+    Parameters
+    ----------
+    standing_out
+        (N,) of bool.
+    campaign
+        The campaign.
+    """
+    poses = len(np.unique(campaign.measurements.pose[standing_out]))
+    if poses < _MIN_STANDING_OUT:
+        return []
+    rows = format_count(int(standing_out.sum()), "row")
+    return [
+        f"{rows} of {format_count(poses, 'pose')} are far from the model and stay: an"
+        " effect that acts there is more probable than so many accidents, and the model"
+        " lacks it"
+    ]
 
 
 def format_gross_error_warnings(gross_errors: list[GrossError]) -> list[str]:

@@ -25,6 +25,11 @@ if TYPE_CHECKING:
     from elastocal.effects.protocol import Candidate
 
 OTHER = "other"
+# Mechanism of the terms of single rows or poses that are wrong (see `contamination`).
+GROSS_ERROR = "gross error"
+# Mechanism of their competitors that act at one end of a variable of the state (see
+# `local_effects`).
+LOCAL_EFFECT = "local effect"
 
 
 @dataclass(frozen=True)
@@ -78,7 +83,8 @@ class ModelPrior:
     A mechanism is present with a small probability. Given that, the number of its
     locations is geometric, and all sets of the same number of locations are equally
     likely, which corrects for multiplicity (Scott and Berger, Annals of Statistics
-    2010).
+    2010). Gross errors are independent accidents: each has the same prior odds, however
+    many there are.
 
     Attributes
     ----------
@@ -110,11 +116,16 @@ def build_model_prior(terms: Sequence[ModelTerm], settings: Settings) -> ModelPr
     special_probabilities = {
         "link_weight": settings.gravity_probability,
         OTHER: settings.other_probability,
+        LOCAL_EFFECT: settings.other_probability,
     }
     slots = {term.slot for term in terms}
     log_odds: dict[str, np.ndarray] = {}
     for mechanism, locations in Counter(mechanism for mechanism, *_ in slots).items():
         counts = np.arange(1, locations + 1)
+        if mechanism == GROSS_ERROR:
+            odds = logit(settings.gross_error_probability)
+            log_odds[mechanism] = odds * np.arange(locations + 1)
+            continue
         geometric = counts * np.log(settings.further_location)
         log_sets = (
             gammaln(locations + 1)

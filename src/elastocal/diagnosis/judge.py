@@ -11,6 +11,7 @@ import numpy as np
 
 from elastocal.campaigns.campaign import NO_REMAINDER, Measurements, tabulate_residuals
 from elastocal.counting import format_count
+from elastocal.diagnosis.contamination import weigh_held_out_rows
 from elastocal.diagnosis.gross_errors import (
     OutlierTest,
     describe_gross_errors,
@@ -47,6 +48,7 @@ from elastocal.validation.held_out import (
 )
 from elastocal.validation.transfer import (
     find_extrapolated_poses,
+    is_same_campaign,
     transfer_fit,
     warn_of_repeated_poses,
 )
@@ -272,8 +274,19 @@ def remove_gross_errors(
         outliers = find_held_out_gross_errors(
             model, estimate, uncertainty, held_out, is_extrapolated, diagnosis.settings
         )
+        if outliers.gross.any() and is_same_campaign(diagnosis.case, held_out):
+            outliers = weigh_held_out_rows(
+                replace(final, model=model, estimate=estimate),
+                uncertainty.noise.without_pose_error,
+                diagnosis.case,
+                held_out,
+                outliers,
+                diagnosis.settings,
+            )
         kept = held_out.select(~outliers.gross) if outliers.gross.any() else held_out
-        if (outliers.gross == previous).all():
+        is_unchanged = model is final.model and estimate is final.estimate
+        if is_unchanged or (outliers.gross == previous).all():
+            # Without frames of its own, another round would repeat this one.
             break
     poses = index_poses(kept.campaign.measurements)
     return outliers, kept, np.bincount(poses, is_extrapolated[~outliers.gross]) > 0

@@ -31,6 +31,7 @@ from elastocal.diagnosis.evidence import (
     log_sum_exp,
 )
 from elastocal.diagnosis.hypotheses import (
+    GROSS_ERROR,
     OTHER,
     ModelPrior,
     ModelTerm,
@@ -216,6 +217,22 @@ def search_models(
     return search.weigh()
 
 
+def search_from_starts(problem: SearchProblem, starts: Iterable[TermSet]) -> Posterior:
+    """Search the models from several starts, each by itself, and weigh all models met.
+
+    Single additions and deletions may not lead from one good model to another: between
+    many gross errors and the one effect that explains them all, every model is worse
+    than both.
+    """
+    merged = problem.initial_search.duplicate()
+    for start in starts:
+        search = problem.initial_search.duplicate()
+        search.evaluate(start)
+        search.grow()
+        merged.absorb(search)
+    return merged.weigh()
+
+
 def select_pose_errors(
     statistics: SufficientStatistics, settings: Settings
 ) -> np.ndarray:
@@ -285,6 +302,14 @@ class BeamSearch:
         duplicate.extended = self.extended.copy()
         return duplicate
 
+    def absorb(self, search: BeamSearch) -> None:
+        """Take over the models that another search of the same problem has met."""
+        for model, log_odds in search.log_odds.items():
+            if log_odds > self.log_odds.get(model, -np.inf):
+                self.log_odds[model] = log_odds
+                self.scales[model] = search.scales[model]
+        self.evaluated |= search.evaluated
+
     def extend(self, model: TermSet) -> None:
         """Meet a model with each single term added."""
         if len(model) >= self.problem.settings.largest_model:
@@ -319,6 +344,9 @@ class BeamSearch:
         by_pose_error : (T, number of terms, S), log evidence with each single term
         by_scale : (number of terms, S), its sum over T
         """
+        if any(term.mechanism == GROSS_ERROR for term in self.problem.terms):
+            # As long as gross errors are in the data, they look like a pose error.
+            return
         best_terms = np.argsort(-log_sum_exp(by_scale, axis=1))[:_TELLING_TERMS]
         weights = log_sum_exp(by_pose_error[:, best_terms], axis=2)
         weights = np.column_stack(

@@ -57,6 +57,9 @@ class Settings:
     smooth_tolerance: float = _DEFAULT.smooth_tolerance
     credible: float = _DEFAULT.credible
     gross_error_level: float = _DEFAULT.gross_error_level
+    gross_error_probability: float = _DEFAULT.gross_error_probability
+    gross_error_reach: float = _DEFAULT.gross_error_reach
+    gross_group_level: float = _DEFAULT.gross_group_level
     gross_error_share: float = _DEFAULT.gross_error_share
     gross_start_numbers: int = _DEFAULT.gross_start_numbers
     extreme_load: float = _DEFAULT.extreme_load

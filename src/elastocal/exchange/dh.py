@@ -29,7 +29,7 @@ as the ``origin`` of a URDF, from the base frame of the controller.
 
 import math
 import re
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from functools import reduce
 from pathlib import Path
@@ -58,8 +58,7 @@ from elastocal.exchange.robot_text import (
     make_elementary_transform,
     make_origin_transform,
 )
-from elastocal.io.documents import read_document
-from elastocal.io.texts import NUMBER_ALLOWED, parse_number
+from elastocal.io.documents import check_document, read_document
 
 _KINDS = {"theta_offset": ANGLE, "d": LENGTH, "a": LENGTH, "alpha": ANGLE}
 _NEEDED = ("d", "a", "alpha")
@@ -330,31 +329,30 @@ def _describe(
     return notes
 
 
-@dataclass(frozen=True)
-class _DhRow:
-    """Elementary transforms of a row, as names with amounts (m, rad), `before` and
-    `behind` the motion of its joint."""
-
-    before: list[tuple[str, float]]
-    behind: list[tuple[str, float]]
+# Elementary transforms as names with amounts, m and rad.
+_Transforms = list[tuple[str, float]]
 
 
-def _split_rows(rows: np.ndarray, *, modified: bool) -> Iterator[_DhRow]:
+def _split_rows(
+    rows: np.ndarray, *, modified: bool
+) -> Iterator[tuple[_Transforms, _Transforms]]:
+    """Split each row into the transforms before and behind the motion of its joint."""
     for theta, d, a, alpha in rows.tolist():
         across = [("Tx", a), ("Rx", alpha)]
         if modified:
-            yield _DhRow([*across, ("Rz", theta)], [("Tz", d)])
+            yield [*across, ("Rz", theta)], [("Tz", d)]
         else:
-            yield _DhRow([("Rz", theta)], [("Tz", d), *across])
+            yield [("Rz", theta)], [("Tz", d), *across]
 
 
 def _format_rows(rows: np.ndarray, *, modified: bool) -> list[str]:
     """Format a table in the chain notation, row by row."""
     tokens: list[str] = []
-    for joint, row in enumerate(_split_rows(rows, modified=modified), 1):
-        tokens += format_tokens(row.before)
+    split_rows = _split_rows(rows, modified=modified)
+    for joint, (before, behind) in enumerate(split_rows, 1):
+        tokens += format_tokens(before)
         tokens.append(f"Rz(q{joint})")
-        tokens += format_tokens(row.behind)
+        tokens += format_tokens(behind)
     return tokens
 
 
@@ -363,9 +361,9 @@ def _format_short_chain(rows: np.ndarray, *, modified: bool) -> list[str]:
     that is closest to the joint frame before."""
     # Fixed transforms before, between and behind the joints, which turn about z.
     fixed = [np.eye(4)]
-    for row in _split_rows(rows, modified=modified):
-        fixed[-1] = fixed[-1] @ _multiply(row.before)
-        fixed.append(_multiply(row.behind))
+    for before, behind in _split_rows(rows, modified=modified):
+        fixed[-1] = fixed[-1] @ _multiply(before)
+        fixed.append(_multiply(behind))
     tokens: list[str] = []
     slide = 0.0
     for joint, transform in enumerate(fixed[:-1], 1):
@@ -378,7 +376,7 @@ def _format_short_chain(rows: np.ndarray, *, modified: bool) -> list[str]:
     return [*tokens, *format_displacement(last)]
 
 
-def _multiply(transforms: Iterable[tuple[str, float]]) -> np.ndarray:
+def _multiply(transforms: _Transforms) -> np.ndarray:
     """Multiply elementary transforms, ndarray (4, 4)."""
     return reduce(
         np.matmul,
@@ -392,21 +390,25 @@ def _multiply(transforms: Iterable[tuple[str, float]]) -> np.ndarray:
 def _robot_from_kinematics(path: str | Path, name: str) -> ImportedRobot:
     """Import the robot of a kinematics file, its links in the order of the arm."""
     source = Path(path).as_posix()
-    links, has_digest = _read_links(path)
+    document = read_document(path)
+    check_document(document, "ros_kinematics", source)
+    entries = document[_KINEMATICS]
+    has_digest = entries.pop("hash", None) is not None
     tokens: list[str] = []
     joint_names = []
     understood = []
-    for joint, (link, origin) in enumerate(links.items(), 1):
-        values = _read_origin(origin, source, f"{_KINEMATICS}.{link}")
-        tokens += format_displacement(make_origin_transform(values[:3], values[3:]))
+    links = _order_links(list(entries), source)
+    for joint, link in enumerate(links, 1):
+        origin = [float(entries[link][key]) for key in _KEYS]
+        tokens += format_displacement(make_origin_transform(origin[:3], origin[3:]))
         tokens.append(f"Rz(q{joint})")
         joint_name = _JOINTS.get(link, link)
         joint_names.append(joint_name)
         understood.append(f"q{joint} is {joint_name} of {link!r}")
-    document = {
+    robot_document = {
         "name": name,
         "joint_names": joint_names,
-        "chain": " ".join([*tokens, f"[{format_point_name([*links][-1])}]"]),
+        "chain": " ".join([*tokens, f"[{format_point_name(links[-1])}]"]),
     }
     notes = [f"read: {', '.join(understood)}"]
     if has_digest:
@@ -416,57 +418,19 @@ def _robot_from_kinematics(path: str | Path, name: str) -> ImportedRobot:
         "base axes are the controller's (base, not base_link, which is turned half round)"
     )
     description = "the kinematics of a calibrated robot as ROS has them"
-    return check_imported(document, path, description, notes)
+    return check_imported(robot_document, path, description, notes)
 
 
-def _read_links(path: str | Path) -> tuple[dict[str, Any], bool]:
-    """Read the entries of the links of a kinematics file, in the order of the arm, and
-    whether the file has a digest of the calibration."""
-    source = Path(path).as_posix()
-    document = read_document(path)
-    if not isinstance(document, dict) or _KINEMATICS not in document:
-        raise InputError(
-            source,
-            "",
-            f"no {_KINEMATICS}",
-            f"{_KINEMATICS} as ROS drivers write them, or a table as .csv",
-        )
-    entries = document[_KINEMATICS]
-    allowed = f"links, each with {', '.join(_KEYS)}"
-    if not isinstance(entries, dict):
-        raise InputError(source, _KINEMATICS, type(entries).__name__, allowed)
-    links = {str(link): origin for link, origin in entries.items() if link != "hash"}
+def _order_links(links: list[str], source: str) -> list[str]:
+    """Put the links of Universal Robots into the order of the arm; those of other robots
+    are in this order in the file."""
     if not links:
-        raise InputError(source, _KINEMATICS, "no link", allowed)
-    if set(links) <= set(_JOINTS):
-        # The table of Universal Robots has the order of the arm.
-        in_order = [link for link in _JOINTS if link in links]
-        for link, expected in zip(in_order, _JOINTS, strict=False):
-            if link != expected:
-                raise InputError(
-                    source,
-                    _KINEMATICS,
-                    f"no link {expected}",
-                    f"every link before {in_order[-1]}",
-                )
-        links = {link: links[link] for link in in_order}
-    return links, "hash" in entries
-
-
-def _read_origin(origin: object, source: str, key: str) -> list[float]:
-    """Read x, y, z (m), roll, pitch and yaw (rad) of a link."""
-    if not isinstance(origin, dict):
-        raise InputError(source, key, type(origin).__name__, ", ".join(_KEYS))
-    if set(origin) != set(_KEYS):
-        raise InputError(
-            source, key, ", ".join(map(str, origin)) or "nothing", ", ".join(_KEYS)
-        )
-    values = []
-    for name in _KEYS:
-        value = parse_number(str(origin[name]))
-        if value is None:
-            raise InputError(
-                source, f"{key}.{name}", repr(origin[name]), NUMBER_ALLOWED
-            )
-        values.append(value)
-    return values
+        raise InputError(source, _KINEMATICS, "no link", "the links of the arm")
+    if not set(links) <= set(_JOINTS):
+        return links
+    arm = list(_JOINTS)[: len(links)]
+    missing = next((link for link in arm if link not in links), None)
+    if missing is not None:
+        allowed = f"{', '.join(_JOINTS)}, without a gap"
+        raise InputError(source, _KINEMATICS, f"no link {missing}", allowed)
+    return arm

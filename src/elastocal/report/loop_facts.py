@@ -4,7 +4,6 @@ the sentences of `campaign.txt`."""
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -235,16 +234,6 @@ def format_cost(effect: Effect, heldout: HeldOut) -> str:
     return f"{size} mm: {certainty}negligible"
 
 
-@dataclass(frozen=True)
-class _Cause:
-    """A possible cause in words, with its probability; cost and gain if it was found."""
-
-    name: str
-    probability: float
-    cost: str = ""
-    gain: float | None = None
-
-
 def tabulate_causes(verdict: Verdict) -> list[dict[str, Any]]:
     """Return the possible causes, the most probable one first.
 
@@ -254,8 +243,8 @@ def tabulate_causes(verdict: Verdict) -> list[dict[str, Any]]:
     """
     if verdict.probabilities is None:
         return []
-    causes = [
-        _Cause(
+    rows = [
+        _make_cause_row(
             say.format_found_effect(effect.name, effect.members),
             effect.probability,
             format_cost(effect, verdict.heldout),
@@ -263,22 +252,28 @@ def tabulate_causes(verdict: Verdict) -> list[dict[str, Any]]:
         )
         for effect in verdict.missing_effects
     ]
-    causes += _list_other_causes(verdict)
-    return [
-        {
-            "name": say.capitalize_first(cause.name),
-            "probability": cause.probability,
-            "words": say.format_probability(cause.probability),
-            "cost": cause.cost,
-            "gain": ""
-            if cause.gain is None
-            else say.set_minus(f"{-100 * cause.gain:+.0f} %"),
-        }
-        for cause in sorted(causes, key=lambda cause: -cause.probability)
+    rows += [
+        _make_cause_row(name, probability)
+        for name, probability in _list_other_causes(verdict)
     ]
+    return sorted(rows, key=lambda row: -row["probability"])
 
 
-def _list_other_causes(verdict: Verdict) -> list[_Cause]:
+def _make_cause_row(
+    name: str, probability: float, cost: str = "", gain: float | None = None
+) -> dict[str, Any]:
+    """Return the row of a possible cause; one that was found has a cost, and a gain if
+    it is known."""
+    return {
+        "name": say.capitalize_first(name),
+        "probability": probability,
+        "words": say.format_probability(probability),
+        "cost": cost,
+        "gain": "" if gain is None else say.set_minus(f"{-100 * gain:+.0f} %"),
+    }
+
+
+def _list_other_causes(verdict: Verdict) -> list[tuple[str, float]]:
     """Return probable causes that are not part of the verdict, the most probable
     first."""
     assert verdict.probabilities is not None
@@ -289,10 +284,10 @@ def _list_other_causes(verdict: Verdict) -> list[_Cause]:
     for name, probability in verdict.probabilities.mechanisms.items():
         if name not in missing:
             cause = competitor if name == OTHER else say.name_effect(name)
-            causes.append(_Cause(cause, probability))
-    causes.append(_Cause(say.NOTHING, verdict.probabilities.nothing))
-    shown = [cause for cause in causes if cause.probability >= _MIN_SHOWN_PROBABILITY]
-    shown.sort(key=lambda cause: -cause.probability)
+            causes.append((cause, probability))
+    causes.append((say.NOTHING, verdict.probabilities.nothing))
+    shown = [cause for cause in causes if cause[1] >= _MIN_SHOWN_PROBABILITY]
+    shown.sort(key=lambda cause: -cause[1])
     return shown[:_MAX_OTHER_CAUSES]
 
 

@@ -63,17 +63,8 @@ class Candidates:
     mean_form: np.ndarray
 
 
-@dataclass(frozen=True)
-class _Designs:
-    """Designs of one kind and size; `selections` (D, size) are indices of candidates."""
-
-    kind: str
-    selections: np.ndarray
-
-    @property
-    def size(self) -> int:
-        """Number of configurations of each design."""
-        return self.selections.shape[1]
+# Kind of designs of one size, and their candidates: (D, size) array of indices.
+_Designs = tuple[str, np.ndarray]
 
 
 def evaluate_designs(
@@ -111,14 +102,16 @@ def evaluate_designs(
             *_draw_random_designs(study, candidates, sizes, load),
         ]
         errors = [
-            _simulate_errors(study, pool, design.selections) for design in designs
+            _simulate_errors(study, pool, selections) for _, selections in designs
         ]
         unobservable = np.flatnonzero(~pool.observable)
         hidden = ", ".join(str(joint + 1) for joint in unobservable)
         yield {
             "load": np.full(len(designs), load, object),
-            "design": np.array([design.kind for design in designs], object),
-            "configurations": np.array([design.size for design in designs]),
+            "design": np.array([kind for kind, _ in designs], object),
+            "configurations": np.array(
+                [selections.shape[1] for _, selections in designs]
+            ),
             "unobservable": np.full(len(designs), hidden, object),
             "rms": np.array([rms for rms, _ in errors]),
             "std_error": np.array([std_error for _, std_error in errors]),
@@ -165,7 +158,7 @@ def _choose_optimal_designs(
         longest = choose_greedily(regressors, max(sizes), rule)
         for size in sizes:
             selection = exchange_candidates(regressors, longest[:size], rule)
-            designs.append(_Designs(kind, np.atleast_2d(selection)))
+            designs.append((kind, np.atleast_2d(selection)))
     return designs
 
 
@@ -180,7 +173,7 @@ def _draw_random_designs(
             draws.choice(candidates, size, replace=False)
             for _ in range(_RANDOM_DESIGNS)
         ]
-        designs.append(_Designs(RANDOM, np.array(selections)))
+        designs.append((RANDOM, np.array(selections)))
     return designs
 
 

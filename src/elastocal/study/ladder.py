@@ -128,34 +128,6 @@ class _ScaledEquations:
 
 
 @dataclass(frozen=True)
-class _Folds:
-    """Normal equations of each fold, and of all other folds together."""
-
-    validation: list[NormalEquations]
-    training: list[_ScaledEquations]
-
-    @classmethod
-    def from_total(cls, folds: list[NormalEquations], total: NormalEquations) -> _Folds:
-        """Subtract each fold from the normal equations of the whole data set."""
-        training = [
-            _ScaledEquations.from_products(
-                total.gram - fold.gram, total.right_side - fold.right_side
-            )
-            for fold in folds
-        ]
-        return cls(folds, training)
-
-    def cross_validate(self, columns: np.ndarray) -> np.ndarray:
-        """Sum of squares (sets,) that fits of columns (sets, k) leave in the folds that
-        they do not use."""
-        errors = [
-            fold.compute_squared_error(training.fit(columns))
-            for fold, training in zip(self.validation, self.training, strict=True)
-        ]
-        return np.sum(errors, axis=0)
-
-
-@dataclass(frozen=True)
 class Ladder:
     """Models of each data set, from no link spring to all L.
 
@@ -244,12 +216,17 @@ def build_ladder(folds: list[NormalEquations], joints: int, links: int) -> Ladde
     sets = len(total.right_side)
     elements = np.arange((total.right_side.shape[1] - joints) // links)
     scaled = _ScaledEquations.from_products(total.gram, total.right_side)
-    validation = _Folds.from_total(folds, total)
+    training = [
+        _ScaledEquations.from_products(
+            total.gram - fold.gram, total.right_side - fold.right_side
+        )
+        for fold in folds
+    ]
     rows = np.arange(sets)
     columns = np.broadcast_to(np.arange(joints), (sets, joints))
     remaining = np.broadcast_to(np.arange(links), (sets, links))
     order = []
-    scores = [validation.cross_validate(columns)]
+    scores = [_cross_validate(folds, training, columns)]
     fits = [scaled.fit(columns)]
     for _ in range(links):
         candidates = [
@@ -258,11 +235,15 @@ def build_ladder(folds: list[NormalEquations], joints: int, links: int) -> Ladde
             )
             for link in remaining.T
         ]
-        errors = np.stack(list(map(validation.cross_validate, candidates)), axis=1)
+        errors = np.stack(
+            [_cross_validate(folds, training, candidate) for candidate in candidates],
+            axis=1,
+        )
         best = np.argmin(errors, axis=1)
         order.append(remaining[rows, best])
         columns = np.stack(candidates)[best, rows]
-        remaining = _remove_columns(remaining, best)
+        is_kept = np.arange(remaining.shape[1]) != best[:, None]
+        remaining = remaining[is_kept].reshape(sets, -1)
         scores.append(errors[rows, best])
         fits.append(scaled.fit(columns))
     return Ladder(
@@ -270,10 +251,16 @@ def build_ladder(folds: list[NormalEquations], joints: int, links: int) -> Ladde
     )
 
 
-def _remove_columns(array: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Remove one column from each row of an array (N, K); returns (N, K - 1)."""
-    kept = np.arange(array.shape[1]) != columns[:, None]
-    return array[kept].reshape(len(array), -1)
+def _cross_validate(
+    folds: list[NormalEquations], training: list[_ScaledEquations], columns: np.ndarray
+) -> np.ndarray:
+    """Sum of squares (sets,) that fits of columns (sets, k) leave in the folds that they
+    do not use."""
+    errors = [
+        fold.compute_squared_error(equations.fit(columns))
+        for fold, equations in zip(folds, training, strict=True)
+    ]
+    return np.sum(errors, axis=0)
 
 
 def evaluate_ladder(
