@@ -814,8 +814,9 @@ def register_to_poses(
             model, observations, nominal_rotation, rotation[session]
         ),
     )
-    start = placement.with_effects(model.effects)
-    return replace(start, coefficients=model.nominal_coefficients)
+    return replace(
+        placement.with_effects(model.effects), coefficients=model.nominal_coefficients
+    )
 
 
 def _rotate_back(rotation: np.ndarray, vectors: np.ndarray) -> np.ndarray:
