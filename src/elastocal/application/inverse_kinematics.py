@@ -49,6 +49,10 @@ _SMALLEST_DAMPING = 1e-14
 _LARGEST_DAMPING = 1e6
 # Starts for each row: an arm of six joints usually has eight postures.
 _STARTS = 12
+# Every so many rows of a path, and the last one, are solved from all starts. Between
+# them the solutions of the nearest such row are close enough for Newton's method, which
+# then needs a few iterations instead of some twenty.
+_ANCHOR_SPACING = 16
 # A joint may turn from target to target by this multiple of the rotation of the path,
 # and by a constant (rad): wrists turn a few times as far as what they hold unless they
 # are near a singular posture, and targets that differ in position alone need some
@@ -225,19 +229,7 @@ def solve_path(
     -------
     angles, error_m : (N, n) and (N,) as in `solve_poses`.
     """
-    low, high = robot.joint_limits.T
-    shares = np.random.default_rng(0).random((_STARTS, robot.joints))
-    starts = low + (high - low) * shares
-    starts[0] = 0.5 * (low + high)
-    angles, error_m = solve_poses(
-        robot,
-        np.tile(position, (_STARTS, 1)),
-        np.tile(rotation, (_STARTS, 1, 1)),
-        np.repeat(starts, len(position), axis=0),
-    )
-    solutions = _Solutions(
-        angles.reshape(_STARTS, -1, robot.joints), error_m.reshape(_STARTS, -1)
-    )
+    solutions = _solve_from_anchors(robot, position, rotation)
     path, path_error_m = _choose_path(robot, position, rotation, solutions)
     steps = np.abs(np.diff(path, axis=0))
     if (
@@ -258,6 +250,52 @@ def solve_path(
         np.concatenate([candidates.error_m for candidates in every]),
     )
     return _choose_path(robot, position, rotation, extended)
+
+
+def _solve_from_anchors(
+    robot: Robot, position: np.ndarray, rotation: np.ndarray
+) -> _Solutions:
+    """Solve the rows of a path from the solutions of some of them, and rows that this
+    does not solve from all starts."""
+    count = len(position)
+    anchors = np.unique([*range(0, count, _ANCHOR_SPACING), count - 1])
+    at_anchors = _solve_from_all_starts(robot, position[anchors], rotation[anchors])
+    postures = _move_into_limits(robot, at_anchors.angles)
+    is_start = _find_distinct(postures, at_anchors.error_m <= SOLVED_M)
+    between_anchors = 0.5 * (anchors[1:] + anchors[:-1])
+    nearest = np.searchsorted(between_anchors, np.arange(count))
+    angles = postures[:, nearest].copy()
+    error_m = np.full(angles.shape[:2], np.inf)
+    start, row = np.nonzero(is_start[:, nearest])
+    angles[start, row], error_m[start, row] = solve_poses(
+        robot, position[row], rotation[row], angles[start, row]
+    )
+    unsolved = np.flatnonzero(~(error_m <= SOLVED_M).any(axis=0))
+    if len(unsolved):
+        again = _solve_from_all_starts(robot, position[unsolved], rotation[unsolved])
+        angles[:, unsolved] = again.angles
+        error_m[:, unsolved] = again.error_m
+    return _Solutions(angles, error_m)
+
+
+def _solve_from_all_starts(
+    robot: Robot, position: np.ndarray, rotation: np.ndarray
+) -> _Solutions:
+    """Solve each row from the middle of the limits and from random angles within
+    them."""
+    low, high = robot.joint_limits.T
+    shares = np.random.default_rng(0).random((_STARTS, robot.joints))
+    starts = low + (high - low) * shares
+    starts[0] = 0.5 * (low + high)
+    angles, error_m = solve_poses(
+        robot,
+        np.tile(position, (_STARTS, 1)),
+        np.tile(rotation, (_STARTS, 1, 1)),
+        np.repeat(starts, len(position), axis=0),
+    )
+    return _Solutions(
+        angles.reshape(_STARTS, -1, robot.joints), error_m.reshape(_STARTS, -1)
+    )
 
 
 def _continue_solutions(
@@ -293,11 +331,7 @@ def _choose_path(
     solution with the smallest error. Returns `angles` (N, n) and `error_m` (N,).
     """
     limits = _narrow_limits(robot)
-    turns = np.floor(
-        (solutions.angles - limits[:, 0] + _ROUNDING) / _find_periods(robot)
-    )
-    shift = np.where(robot.chain.prismatic, 0.0, 2 * np.pi * turns)
-    lowest = solutions.angles - shift
+    lowest = _move_into_limits(robot, solutions.angles)
     error_m = solutions.error_m
     usable = _find_usable(robot, lowest, error_m)
     best = np.argmin(error_m, axis=0), np.arange(error_m.shape[1])
@@ -316,6 +350,14 @@ def _choose_path(
         path[rows] = _find_least_motion(candidates)
     largest_error_m = np.where(usable, error_m, 0.0).max(axis=0)
     return path, np.where(is_solved, largest_error_m, error_m[best])
+
+
+def _move_into_limits(robot: Robot, angles: np.ndarray) -> np.ndarray:
+    """Subtract whole turns from angles (..., n), so that each is the lowest one above its
+    lower limit."""
+    low = _narrow_limits(robot)[:, 0]
+    turns = np.floor((angles - low + _ROUNDING) / _find_periods(robot))
+    return angles - np.where(robot.chain.prismatic, 0.0, 2 * np.pi * turns)
 
 
 def _find_periods(robot: Robot) -> np.ndarray:
@@ -352,12 +394,19 @@ def _narrow_limits(robot: Robot) -> np.ndarray:
 def _find_usable(robot: Robot, angles: np.ndarray, error_m: np.ndarray) -> np.ndarray:
     """Find the solutions (K, N, n) of each row that reach the pose within the limits,
     each once; (K, N) bool."""
-    usable = (error_m <= SOLVED_M) & ~find_beyond_limits(robot, angles).any(axis=-1)
-    for number in range(1, len(usable)):
+    is_within = ~find_beyond_limits(robot, angles).any(axis=-1)
+    return _find_distinct(angles, (error_m <= SOLVED_M) & is_within)
+
+
+def _find_distinct(angles: np.ndarray, candidate: np.ndarray) -> np.ndarray:
+    """Find the candidates (K, N) among the solutions (K, N, n) of each row, each once;
+    (K, N) bool."""
+    distinct = candidate.copy()
+    for number in range(1, len(distinct)):
         distance = np.abs(angles[:number] - angles[number]).max(axis=-1)
-        repeated = (distance < _SAME) & usable[:number]
-        usable[number] &= ~repeated.any(axis=0)
-    return usable
+        repeated = (distance < _SAME) & distinct[:number]
+        distinct[number] &= ~repeated.any(axis=0)
+    return distinct
 
 
 @dataclass(frozen=True)
