@@ -336,6 +336,6 @@ def compute_error_budget(
     optional = {
         "left by the regression": root_mean_square(remaining.regression_m),
         "form of the model": root_mean_square(remaining.form_m),
-        "not commanded": remaining.scope.left_out_m,
+        "not commanded": root_mean_square(remaining.left_out_m),
     }
     return budget | {name: rms_m for name, rms_m in optional.items() if rms_m}
