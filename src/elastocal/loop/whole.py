@@ -136,20 +136,20 @@ def build_calibrated_robot(
     residual = compute_position_residuals(
         *transfer_fit(final, case, held_out), held_out.observations
     )
-    noise_m = final.noise.position_m
+    # What the model leaves beyond this noise counts as an error of the robot.
+    noise_m = diagnosis.verdict.noise.position_m
     regression = None
     spread = delivered.choice.spread if delivered is not None else None
-    if delivered is not None and delivered.predictor is not None and spread is not None:
-        noise_m = diagnosis.verdict.noise.position_m
-        if not physics_only:
-            residual = delivered.residual
-            regression = build_residual_model(
-                case,
-                final.estimate,
-                delivered.predictor,
-                spread.typical,
-                noise_m,
-            )
+    if (
+        delivered is not None
+        and delivered.predictor is not None
+        and spread is not None
+        and not physics_only
+    ):
+        residual = delivered.residual
+        regression = build_residual_model(
+            case, final.estimate, delivered.predictor, spread.typical, noise_m
+        )
     robot = calibrate_on_case(
         case, final.model, final.estimate, final.covariance, final.noise, regression
     )
