@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 import re
 from importlib import import_module, resources
-from inspect import isfunction, signature
 from textwrap import dedent, indent
 
 import yaml
@@ -119,24 +118,9 @@ def _tables() -> str:
 
 
 def table_schemas(module: str) -> list[TableSchema]:
-    """Every schema of a module, with those that go with the number of joints."""
-    package = import_module(module)
-    schemas = []
-    for name, thing in vars(package).items():
-        if isinstance(thing, TableSchema):
-            schemas.append(thing.for_joints(JOINTS))
-        elif (
-            isfunction(thing)
-            and thing.__module__ == module
-            and not name.startswith("_")
-        ):
-            made_of = (
-                list(signature(thing).parameters),
-                thing.__annotations__.get("return"),
-            )
-            if made_of in ((["joints"], TableSchema), (["joints"], "TableSchema")):
-                schemas.append(thing(JOINTS))
-    return schemas
+    """Every schema of a module, for a robot with so many joints."""
+    schemas = import_module(module).SCHEMAS.values()
+    return [schema.for_joints(JOINTS) for schema in schemas]
 
 
 def _table(schema: TableSchema) -> str:

@@ -114,6 +114,23 @@ def test_quantiles_are_exact_in_one_and_in_three_directions():
     )
 
 
+def test_quantiles_are_those_of_branches_whichever_is_true():
+    """Of 200,000 draws; a gamma distribution of each square is a percent off."""
+    stream = np.random.default_rng(1)
+    covariance = np.diag([4.0, 1.0, 0.25])
+    for size in (0.5, 2.0, 6.0):
+        branches = size * np.array([[1.0, 1.0, 0.0], [-1.0, 0.0, 2.0]])
+        drawn = branches[stream.integers(2, size=200_000)]
+        drawn = drawn + stream.standard_normal(drawn.shape) * np.sqrt(
+            np.diag(covariance)
+        )
+        (quantile,) = compute_length_quantiles(covariance[None], branches[None])
+        held = np.mean(np.linalg.norm(drawn, axis=1) < quantile)
+        assert held == pytest.approx(0.95, abs=0.02), size
+    (narrow,) = compute_length_quantiles(np.zeros((1, 3, 3)), np.ones((1, 4, 3)))
+    assert narrow == pytest.approx(np.sqrt(3.0), rel=0.01)
+
+
 @pytest.fixture(scope="module")
 def campaign(kuka, tmp_path_factory, config_folder):
     """Case, held-out case, fit and calibrated robot of a campaign."""

@@ -28,7 +28,7 @@ def test_a_campaign_is_read_as_written(cell):
     assert campaign.measured == "pose"
     assert campaign.frame == "base"
     assert campaign.targets == (
-        Target("A", "elbow", (0.0, 0.0, 0.1)),
+        Target("A", "elbow", (0.0, 0.0, 0.1), offset_std_m=2e-4),
         Target("B", "hand", None),
     )
     assert campaign.compliance == "identify"

@@ -28,6 +28,7 @@ from elastocal.diagnosis.verdict import (
     conclude,
     find_contradictions,
     rank_hypotheses,
+    warn_of_excess_scatter,
 )
 from elastocal.fitting.model import get_joint_compliances
 
@@ -256,6 +257,21 @@ def test_residuals_far_beyond_the_measured_noise_contradict_adequacy(
     assert all("scatter about the model" in sentence for sentence in sentences)
     declared = replace(measured, source="declared")
     assert find_contradictions(scattered, declared, SETTINGS) == []
+
+
+@pytest.mark.parametrize(("source", "repeats"), [("declared", 0), ("repeats", 900)])
+@pytest.mark.parametrize(("factor", "count"), [(1.0, 0), (1.02, 0), (1.3, 1)])
+def test_a_small_excess_over_hundreds_of_numbers_is_no_noise(
+    fitted, factor, count, source, repeats
+):
+    measured = replace(fitted.noise, source=source, degrees_of_freedom=repeats)
+    scattered = replace_noise(fitted, position_m=factor * measured.position_m)
+    scattered = replace(scattered, residual=np.tile(fitted.residual, (4, 1)))
+    sentences = warn_of_excess_scatter(scattered, measured, SETTINGS.scatter_level)
+    assert len(sentences) == count
+    assert all("1.30 times" in sentence for sentence in sentences)
+    unknown = replace(measured, source="residual")
+    assert warn_of_excess_scatter(scattered, unknown, 1.0) == []
 
 
 @pytest.mark.parametrize(("pose_rad", "count"), [(4e-4, 0), (1e-3, 1)])

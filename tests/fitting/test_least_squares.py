@@ -640,3 +640,29 @@ def test_a_slow_linear_fixed_point_is_found_in_as_many_steps_as_it_has_unknowns(
         rounds.append((argument, value))
         argument = least_squares._extrapolate_fixed_point(rounds)
     np.testing.assert_allclose(argument, fixed_point, atol=1e-9)
+
+
+@pytest.mark.parametrize("offset_std_m", [1e-6, 2e-4])
+def test_a_declared_offset_is_estimated_with_its_prior(kuka, offset_std_m):
+    """The mean of the measured offsets and the prior have the weights of their
+    variances, and the standard error is that of both together."""
+    declared = (0.1, 0.0, 0.05)
+    deviation = np.array([3e-4, -1e-4, 2e-4])
+    target = Target("A", "6DoF", declared, offset_std_m=offset_std_m)
+    model = make_model(kuka, (target,), fitted_frames=False)
+    states = make_states(kuka.joints, 25)
+    true = replace(
+        make_estimate(model, size=0.0),
+        target_offset=(np.array(declared) + deviation)[None],
+    )
+    observations = observe_exactly(model, true, states)
+    noise = Noise("declared", 5e-5, 5e-5, np.zeros(6))
+    fitted = fit_model(model, observations, noise)
+    data_variance = noise.position_m**2 / len(observations)
+    share = offset_std_m**2 / (offset_std_m**2 + data_variance)
+    np.testing.assert_allclose(
+        fitted.estimate.target_offset[0] - declared, share * deviation, rtol=1e-4
+    )
+    np.testing.assert_allclose(
+        np.diag(fitted.covariance), share * data_variance, rtol=1e-4
+    )

@@ -29,6 +29,7 @@ from elastocal.fitting.model import (
     evaluate_conditions,
     find_nonlinear_parameters,
     get_parameter_bounds,
+    get_parameter_values,
     list_parameters,
     predict,
 )
@@ -339,3 +340,36 @@ def test_effects_at_zero_leave_the_predictions_of_the_declared_model(name):
     np.testing.assert_allclose(
         compute_residuals(model, with_zeros, observations, conditions), 0.0, atol=1e-14
     )
+
+
+def test_a_declared_offset_is_a_parameter_about_its_declared_value(kuka, campaign):
+    """Its steps, values and priors count from what is declared; an exact one is none."""
+    model = build_declared_model(campaign)
+    inexact = Target("B", "6DoF", (0.1, 0.0, -0.2), offset_std_m=2e-4)
+    exact = Target("C", "6DoF", (0.0, 0.1, 0.0))
+    model = replace(model, targets=(TWO_TARGETS[0], inexact, exact), rows=3)
+    estimate = make_estimate(model)
+    offset = estimate.target_offset.copy()
+    offset[1] = inexact.offset_m
+    estimate = replace(estimate, target_offset=offset)
+    parameters = list_parameters(model, estimate)
+    owned = [
+        (owner, parameter.prior_std)
+        for owner, parameter in parameters
+        if owner.startswith("target ")
+    ]
+    assert owned == [("target A", None)] * 3 + [("target B", 2e-4)] * 3
+    index = [owner for owner, _ in parameters].index("target B")
+    step = np.zeros(len(parameters))
+    step[index : index + 3] = 1e-4, -2e-4, 3e-4
+    moved = apply_step(model, estimate, step)
+    np.testing.assert_allclose(
+        get_parameter_values(model, moved)[index : index + 3],
+        step[index : index + 3],
+        atol=1e-15,
+    )
+    np.testing.assert_allclose(
+        moved.target_offset[1], np.add(inexact.offset_m, [1e-4, -2e-4, 3e-4])
+    )
+    assert model.has_unknown_targets
+    assert build_nominal_model(model).targets[1].offset_std_m == 0.0

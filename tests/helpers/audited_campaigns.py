@@ -59,7 +59,7 @@ def diagnosed_campaign(top, robot, effects=(), **design):
     for name, of_set in zip(("training", "held_out"), measurements, strict=True):
         write_table(
             results / f"{name}.parquet",
-            schemas.build_measurements_schema(arm.joints),
+            schemas.MEASUREMENTS.for_joints(arm.joints),
             [tabulate_measurements(of_set)],
             {},
         )
@@ -85,7 +85,7 @@ def diagnosed_campaign(top, robot, effects=(), **design):
     blocks = generate_residual_blocks(restored, judge_and_predict(restored, unseen, 1))
     write_table(
         reports / "residuals.parquet",
-        schemas.build_residuals_schema(arm.joints),
+        schemas.RESIDUALS.for_joints(arm.joints),
         blocks,
         {},
     )

@@ -12,7 +12,7 @@ from elastocal.errors import InputError
 from elastocal.io.json_files import write_json
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop.diagnosis_tables import refit_step, serialize_diagnosis
-from elastocal.loop.schemas import build_measurements_schema
+from elastocal.loop.schemas import MEASUREMENTS
 from elastocal.loop.whole import read_cases
 from elastocal_proof.league.methods import (
     FRAMES,
@@ -67,7 +67,7 @@ def test_a_data_set_is_read_back_from_its_files(data, tmp_path):
         tmp_path / name for name in ("campaign.json", "seen.parquet", "folds.parquet")
     )
     write_json(descriptions, data.descriptions)
-    write_table(measurements, build_measurements_schema(6), [data.columns], {})
+    write_table(measurements, MEASUREMENTS.for_joints(6), [data.columns], {})
     write_table(folds, FOLDS, [data.folds], {})
     loaded = load_data_set(descriptions, measurements, folds)
     for name, values in data.columns.items():

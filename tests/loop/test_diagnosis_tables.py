@@ -20,7 +20,7 @@ from elastocal.io.json_files import write_json
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.loading import load_campaign
-from elastocal.loop.schemas import STEPS, build_measurements_schema
+from elastocal.loop.schemas import MEASUREMENTS, STEPS
 
 MODELS = {
     "frames, targets, springs": (dict(fitted_frames=True, rows=6, identified=True), ()),
@@ -55,7 +55,7 @@ def test_a_case_is_restored_and_may_be_validated_by_another_campaign(
     files = (tmp_path / "descriptions.json", tmp_path / "training.parquet")
     write_json(files[0], descriptions | {"held_out": validating})
     write_table(
-        files[1], build_measurements_schema(6), [tabulate_measurements(training)], {}
+        files[1], MEASUREMENTS.for_joints(6), [tabulate_measurements(training)], {}
     )
     case = tables.load_case(*files)
     for name in ("pose", "load", "joint_angles", "wrench", "position"):

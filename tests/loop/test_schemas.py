@@ -10,8 +10,8 @@ from elastocal.loop import schemas
 def test_columns_have_unique_names_and_a_meaning():
     for schema in (
         schemas.STEPS,
-        schemas.build_measurements_schema(7),
-        schemas.build_residuals_schema(7),
+        schemas.MEASUREMENTS.for_joints(7),
+        schemas.RESIDUALS.for_joints(7),
     ):
         assert len({column.name for column in schema.columns}) == len(schema.columns)
         assert all(column.meaning.strip() for column in schema.columns)
@@ -20,14 +20,14 @@ def test_columns_have_unique_names_and_a_meaning():
 def test_residuals_are_read_without_gross_errors(tmp_path):
     columns = {
         column.name: np.ones(3, column.type)
-        for column in schemas.build_residuals_schema(6).columns
+        for column in schemas.RESIDUALS.for_joints(6).columns
     }
     columns |= {
         "row": np.array([1, 2, 3], np.int32),
         "gross_error": np.array([False, True, False]),
     }
     write_table(
-        tmp_path / "residuals.parquet", schemas.build_residuals_schema(6), [columns], {}
+        tmp_path / "residuals.parquet", schemas.RESIDUALS.for_joints(6), [columns], {}
     )
     assert schemas.read_residuals(tmp_path / "residuals.parquet", 6)[
         "row"

@@ -1,15 +1,18 @@
 """Components of displacements and wrenches, as all tables have them."""
 
-from elastocal.campaigns.measurements import describe_columns
-from elastocal.mechanics.components import COMPONENTS, WRENCH_NAMES
+from elastocal.mechanics.components import COMPONENT_NAMES, WRENCH_NAMES
+from elastocal.study.schemas import DEFLECTIONS, EXPERIMENTS
 
 
 def test_a_force_and_the_displacement_along_it_have_the_same_index():
-    columns = describe_columns(6)
-    for (moved, unit, moves), load in zip(COMPONENTS, WRENCH_NAMES, strict=True):
-        assert (moved[0], load[0], unit, columns[load].unit) in [
+    columns = {
+        column.name: column for column in (*DEFLECTIONS.columns, *EXPERIMENTS.columns)
+    }
+    for moved, load in zip(COMPONENT_NAMES, WRENCH_NAMES, strict=True):
+        assert (moved[0], load[0], columns[moved].unit, columns[load].unit) in [
             ("d", "f", "m", "N"),
             ("r", "m", "rad", "N m"),
         ]
-        assert moved[1] == load[1] == moves[-1]
-        assert f" {load[1]}," in columns[load].meaning
+        assert moved[1] == load[1]
+        for name in (moved, load):
+            assert f"base {name[1]}," in columns[name].meaning

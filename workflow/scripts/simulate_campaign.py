@@ -25,7 +25,7 @@ def simulate_campaign(job: Job) -> None:
         "measured": "pose",
         "frame": "base",
         "targets": {
-            point: {"point": point, "offset_m": [0, 0, 0]}
+            point: {"point": point, "offset_m": [0, 0, 0], "offset_std_m": 0}
             for point in settings["points"]
         },
         "compliance": "identify",

@@ -9,7 +9,8 @@ frame of `frames`. The predicted error has four parts:
 - the uncertainty about the form of the model: differences between the models of the
   diagnosis, or held-out poses if these show more;
 - all that the fit ascribes to effects that no command contains, such as hysteresis or a
-  step of the set-up, because nothing shows that they leave the robot alone.
+  step of the set-up, because nothing shows that they leave the robot alone: at each
+  pose, under all conditions that no command states (`left_out`).
 
 If a regression on the residuals corrects a pose, the first two parts are at least as
 large as its cross-validated errors, and these contain the uncertainty about the form
@@ -18,13 +19,14 @@ unless held-out poses show more. The tracker's noise is in none of the parts.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import gammaincinv
+from scipy.special import gammainc, gammaincinv
 
 from elastocal.application.calibrated import (
+    build_states,
     compute_pose_sensitivities,
     factor_covariance,
     predict_poses,
@@ -55,6 +57,11 @@ _SEED = 1
 # Ratio of the squared model-form error at the worst pose to its mean square. It is 7 to
 # 9 on simulated robots.
 _WORST_OF_FORM = 9.0
+# Least variance of a squared length over the square of its mean: a length of a hundredth
+# more or less.
+_MIN_RELATIVE_VARIANCE = 1e-4
+# Bisections of the range of a quantile, to a thousandth of it.
+_BISECTIONS = 10
 # Poses for which the errors of all simulated robots are in memory at once.
 _CHUNK = 200
 # Upper bound on the states over which the accuracy of a campaign is stated; more states
@@ -72,7 +79,8 @@ class ErrorPrediction:
     repeated_m : (N,) RMS error by the repeatability and the random error of each pose.
     regression_m : (N,) RMS error of a regression on the residuals beyond both.
     form_m : (N,) RMS error by the uncertain form of the model.
-    error_m : (N,) RMS error by all of these and by effects that no command contains.
+    left_out_m : (N,) RMS error by effects that no command contains.
+    error_m : (N,) RMS error by all of these.
     bound_m : (N,) upper bound on each error with `CONFIDENCE`.
     orientation_rad : (N,) RMS orientation error by the parameters and the repeatability.
         Nothing is known of the other parts, which positions alone show.
@@ -85,6 +93,7 @@ class ErrorPrediction:
     repeated_m: np.ndarray
     regression_m: np.ndarray
     form_m: np.ndarray
+    left_out_m: np.ndarray
     error_m: np.ndarray
     bound_m: np.ndarray
     orientation_rad: np.ndarray
@@ -105,7 +114,7 @@ class ErrorPrediction:
             region=region,
             offset_removed=scope.offset_removed,
             left_out=scope.left_out,
-            left_out_m=scope.left_out_m,
+            left_out_m=root_mean_square(self.left_out_m),
             form_m=root_mean_square(self.form_m),
             contradicted=scope.contradicted,
             repeated_m=root_mean_square(self.repeated_m),
@@ -147,33 +156,72 @@ def predict_errors(
     parameter_variance = np.diagonal(errors.parameter_covariance, axis1=1, axis2=2)
     repeat_variance = np.diagonal(errors.repeat_covariance, axis1=1, axis2=2)
     pose_variance = parameter_variance + repeat_variance
-    left_out = scope.left_out_m**2
+    left_out = errors.left_out.mean_square
     covered = regression.active & (not scope.contradicted)
     form = np.where(covered, 0.0, scope.form_m**2)
     isotropic = ((errors.additional[1] + form) / 3.0)[:, None, None] * np.eye(3)
-    quantile = compute_length_quantiles(
-        (errors.parameter_covariance + errors.repeat_covariance)[:, :3, :3] + isotropic
-    )
     # A model-form error is one function over all poses; only its size is unknown.
     drawn_form = form.mean() * robots.stream.standard_normal(draws) ** 2
     mean_square = errors.sum_of_squares / len(reported_angles)
+    largest_left_out = (errors.left_out.branches**2).sum(axis=2).max()
     return ErrorPrediction(
         parameters_m=np.sqrt(parameter_variance[:, :3].sum(axis=1)),
         repeated_m=np.sqrt(repeat_variance[:, :3].sum(axis=1)),
         regression_m=np.sqrt(errors.additional[0]),
         form_m=np.sqrt(form),
+        left_out_m=np.sqrt(left_out),
         error_m=np.sqrt(
             pose_variance[:, :3].sum(axis=1) + errors.additional[0] + left_out + form
         ),
-        bound_m=np.sqrt(quantile**2 + left_out),
+        bound_m=compute_length_quantiles(
+            (errors.parameter_covariance + errors.repeat_covariance)[:, :3, :3]
+            + errors.left_out.covariance
+            + isotropic,
+            errors.left_out.branches,
+        ),
         orientation_rad=np.sqrt(pose_variance[:, 3:].sum(axis=1)),
-        rms_m=np.sqrt(mean_square + left_out + drawn_form),
+        rms_m=np.sqrt(mean_square + left_out.mean() + drawn_form),
         worst_m=np.sqrt(
-            errors.largest_square
-            + scope.left_out_worst_m**2
-            + _WORST_OF_FORM * drawn_form
+            errors.largest_square + largest_left_out + _WORST_OF_FORM * drawn_form
         ),
         scope=scope,
+    )
+
+
+@dataclass(frozen=True)
+class _LeftOutErrors:
+    """Errors at N poses by effects that no command contains.
+
+    Attributes
+    ----------
+    branches : (N, K, 3) errors under K conditions, m.
+    covariance : (N, 3, 3) covariance of each by the uncertainty of the effects, m^2.
+    """
+
+    branches: np.ndarray
+    covariance: np.ndarray
+
+    @property
+    def mean_square(self) -> np.ndarray:
+        """(N,) mean squared lengths, m^2."""
+        squares = (self.branches**2).sum(axis=2).mean(axis=1)
+        return np.asarray(squares + np.trace(self.covariance, axis1=1, axis2=2))
+
+
+def _predict_left_out_errors(
+    calibrated: CalibratedRobot,
+    reported_angles: np.ndarray,
+    wrench: np.ndarray,
+    pose: tuple[np.ndarray, np.ndarray],
+) -> _LeftOutErrors:
+    """Predict the errors by left-out effects at poses that are given, too."""
+    scope = calibrated.scope
+    if scope.left_out_effects is None:
+        count = len(reported_angles)
+        return _LeftOutErrors(np.zeros((count, 1, 3)), np.zeros((count, 3, 3)))
+    states = build_states(calibrated, reported_angles, wrench)
+    return _LeftOutErrors(
+        *scope.left_out_effects.predict_branches(scope, states, *pose)
     )
 
 
@@ -262,6 +310,7 @@ class _ChunkErrors:
     parameter_covariance, repeat_covariance : (K, 6, 6) covariances of the pose errors.
     additional : (2, K) squared errors of the regression beyond these, m^2, as in
         `_RegressionErrors.squares`.
+    left_out : errors by effects that no command contains.
     sum_of_squares, largest_square : (draws,) sum and maximum over the poses of the
         squared position errors of each random robot, m^2.
     """
@@ -269,6 +318,7 @@ class _ChunkErrors:
     parameter_covariance: np.ndarray
     repeat_covariance: np.ndarray
     additional: np.ndarray
+    left_out: _LeftOutErrors
     sum_of_squares: np.ndarray
     largest_square: np.ndarray
 
@@ -284,6 +334,10 @@ def _merge_chunks(chunks: list[_ChunkErrors]) -> _ChunkErrors:
         np.concatenate([chunk.parameter_covariance for chunk in chunks]),
         np.concatenate([chunk.repeat_covariance for chunk in chunks]),
         np.concatenate([chunk.additional for chunk in chunks], axis=1),
+        _LeftOutErrors(
+            np.concatenate([chunk.left_out.branches for chunk in chunks]),
+            np.concatenate([chunk.left_out.covariance for chunk in chunks]),
+        ),
         sum_of_squares,
         largest_square,
     )
@@ -297,7 +351,8 @@ def _predict_chunk(
     robots: _RandomRobots,
 ) -> _ChunkErrors:
     """Predict the errors at a chunk of poses, and simulate those of random robots."""
-    placed = _compute_placed_sensitivities(calibrated, reported_angles, wrench)
+    pose = predict_poses(calibrated, reported_angles, wrench)
+    placed = _compute_placed_sensitivities(calibrated, reported_angles, wrench, pose)
     by_parameters = placed @ robots.covariance_factor
     robot = calibrated.robot
     angles = robot.model_angles(reported_angles)
@@ -318,30 +373,37 @@ def _predict_chunk(
         parameter_covariance,
         repeat_covariance,
         additional,
+        _predict_left_out_errors(calibrated, reported_angles, wrench, pose),
         squares.sum(axis=0),
         squares.max(axis=0),
     )
 
 
 def _compute_placed_sensitivities(
-    calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray
+    calibrated: CalibratedRobot,
+    reported_angles: np.ndarray,
+    wrench: np.ndarray,
+    pose: tuple[np.ndarray, np.ndarray],
 ) -> np.ndarray:
     """Compute sensitivities (K, 6, P) of the poses after the best placement."""
-    pose = predict_poses(calibrated, reported_angles, wrench)
     columns = compute_placement_columns(calibrated.scope, *pose)
     sensitivities = compute_pose_sensitivities(calibrated, reported_angles, wrench)
     return np.asarray(sensitivities - columns @ calibrated.scope.absorbed)
 
 
-def compute_length_quantiles(covariance: np.ndarray) -> np.ndarray:
-    """Compute the quantile with `CONFIDENCE` of the length of normal vectors.
+def compute_length_quantiles(
+    covariance: np.ndarray, branches: np.ndarray | None = None
+) -> np.ndarray:
+    """Compute the quantile with `CONFIDENCE` of the length of normal vectors, whose mean
+    is one of several that are equally probable.
 
-    The squared length is approximated by the gamma distribution with the same mean and
-    variance [1].
+    The squared length about each mean is approximated by the gamma distribution with the
+    same mean and variance [1].
 
     Parameters
     ----------
     covariance : (N, 3, 3) covariances of the vectors.
+    branches : (N, K, 3) their possible means; None for zero.
 
     Returns
     -------
@@ -352,12 +414,27 @@ def compute_length_quantiles(covariance: np.ndarray) -> np.ndarray:
     .. [1] Satterthwaite, F. E., An approximate distribution of estimates of variance
        components, Biometrics Bulletin 2, 1946.
     """
-    mean = np.trace(covariance, axis1=1, axis2=2)
-    variance = 2.0 * (covariance**2).sum(axis=(1, 2))
+    if branches is None:
+        branches = np.zeros((len(covariance), 1, 3))
+    mean = np.trace(covariance, axis1=1, axis2=2)[:, None] + (branches**2).sum(axis=2)
+    variance = 2.0 * (covariance**2).sum(axis=(1, 2))[:, None] + 4.0 * (
+        branches @ covariance * branches
+    ).sum(axis=2)
+    # Zero lengths, and lengths that do not vary, have no distribution of this kind.
     positive_mean = np.where(mean > 0.0, mean, 1.0)
-    positive_variance = np.where(variance > 0.0, variance, 1.0)
-    shape = np.where(mean > 0.0, positive_mean**2 / positive_variance, 1.5)
-    return np.sqrt(gammaincinv(shape, CONFIDENCE) * mean / shape)
+    variance = np.maximum(variance, _MIN_RELATIVE_VARIANCE * positive_mean**2)
+    shape = positive_mean**2 / variance
+    quantiles = gammaincinv(shape, CONFIDENCE) * mean / shape
+    # The quantile of the mixture lies between those of its branches.
+    low = quantiles.min(axis=1)
+    high = quantiles.max(axis=1)
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        shares = middle[:, None] * shape / positive_mean
+        probability = gammainc(shape, shares).mean(axis=1)
+        low = np.where(probability < CONFIDENCE, middle, low)
+        high = np.where(probability < CONFIDENCE, high, middle)
+    return np.sqrt(high)
 
 
 def compute_uncorrected_errors(
@@ -429,7 +506,7 @@ def inflate_to_held_out_errors(
         return calibrated
     state = observations.state[tested]
     commands = calibrated.robot.reported_angles(states.joint_angles)
-    predicted = predict_errors(calibrated, commands, states.wrench)
+    predicted = predict_errors(_with_all_effects(calibrated), commands, states.wrench)
     sensor_variance = noise_m**2 / states.repeats[state]
     stream = np.random.default_rng(_SEED)
     chi_squares = stream.chisquare(3, (len(state), len(predicted.rms_m)))
@@ -440,3 +517,10 @@ def inflate_to_held_out_errors(
     explained = (predicted.error_m[state] ** 2 - predicted.form_m[state] ** 2).mean()
     excess = mean_square - 3.0 * sensor_variance.mean() - explained
     return set_form_error(calibrated, float(np.sqrt(excess)), contradicted=True)
+
+
+def _with_all_effects(calibrated: CalibratedRobot) -> CalibratedRobot:
+    """Return a robot whose errors leave nothing out, as the residuals of the model with
+    all its effects do."""
+    scope = replace(calibrated.scope, left_out=(), left_out_effects=None)
+    return replace(calibrated, scope=scope)

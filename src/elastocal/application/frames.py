@@ -16,8 +16,12 @@ Crystallographica A32, 1976.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from elastocal.application.left_out import LeftOutEffects
 
 ROBOT = "robot"
 BASE = "base"
@@ -44,8 +48,7 @@ class Scope:
         less that of the calibrated one best.
     offset_removed : whether a constant offset at the end effector is not an error.
     left_out : keys of the effects of the fit that no command contains.
-    left_out_m, left_out_worst_m : contribution of these effects at the campaign's
-        poses, RMS and maximum.
+    left_out_effects : these effects; None if there are none.
     form_m : RMS error at the campaign's poses because the form of the model is
         uncertain.
     contradicted : whether held-out poses showed `form_m` to be larger than the
@@ -64,8 +67,7 @@ class Scope:
     )
     offset_removed: bool = False
     left_out: tuple[str, ...] = ()
-    left_out_m: float = 0.0
-    left_out_worst_m: float = 0.0
+    left_out_effects: LeftOutEffects | None = None
     form_m: float = 0.0
     contradicted: bool = False
     repeatability_dof: float = 0.0

@@ -10,14 +10,10 @@ import numpy as np
 
 from elastocal.application.calibrated import (
     ResidualModel,
-    build_observations,
     calibrate_by_model,
     compute_nominal_poses,
     compute_pose_sensitivities,
-    factor_covariance,
-    move_to_end_effector,
     predict_poses,
-    zero_coefficients,
 )
 from elastocal.application.frames import (
     BASE,
@@ -27,14 +23,9 @@ from elastocal.application.frames import (
     fit_placement,
     select_free_parameters,
 )
-from elastocal.fitting.linearization import linearize
-from elastocal.fitting.model import (
-    compute_displaced_coordinates,
-    evaluate_conditions,
-    list_parameters,
-)
+from elastocal.application.left_out import LeftOutEffects
 from elastocal.fitting.noise import estimate_joint_repeatability
-from elastocal.mechanics.kinematics import compute_pose_differences, compute_poses
+from elastocal.mechanics.kinematics import compute_pose_differences
 from elastocal.residual_model.selection import is_commanded
 
 if TYPE_CHECKING:
@@ -210,33 +201,14 @@ def _add_left_out_effects(
     covariance: np.ndarray,
     states: States,
 ) -> Scope:
-    """Add the errors by effects that are in no command to a scope."""
+    """Add the effects that are in no command to a scope."""
     left_out = tuple(effect.key for effect in model.effects if not is_commanded(effect))
     if not left_out:
         return scope
-    if model.row_span is None and states.row is not None:
-        # Drift counts from the first to the last row of the campaign, also if it is
-        # evaluated at other states.
-        model = replace(model, row_span=(int(states.row.min()), int(states.row.max())))
-    epochs = [states]
-    if not model.fitted_frames:
-        # A declared base is not placed again before use, so the drift by the end of the
-        # campaign counts in full.
-        epochs.append(_move_to_end_of_campaign(states))
-    rms_m = []
-    worst_m = []
-    for epoch in epochs:
-        fields = _compute_left_out_fields(model, estimate, covariance, epoch)
-        residual = fields - placement.columns @ placement.fit(fields)
-        squares = (residual[:, :3] ** 2).sum(axis=(1, 2))
-        rms_m.append(float(np.sqrt(squares.mean())))
-        worst_m.append(float(np.sqrt(squares.max())))
-    return replace(
-        scope,
-        left_out=left_out,
-        left_out_m=max(rms_m),
-        left_out_worst_m=max(worst_m),
-    )
+    effects = LeftOutEffects.from_fit(model, estimate, covariance, states)
+    fields = effects.compute_fields(effects.states)
+    effects = replace(effects, absorbed=placement.fit(fields))
+    return replace(scope, left_out=left_out, left_out_effects=effects)
 
 
 def is_offset_fitted(targets: Sequence[Target], end_effector: str) -> bool:
@@ -244,50 +216,3 @@ def is_offset_fitted(targets: Sequence[Target], end_effector: str) -> bool:
     constant offset there is no error."""
     numbers = _find_targets_on(targets, end_effector)
     return bool(numbers) and all(targets[number].offset_m is None for number in numbers)
-
-
-def _move_to_end_of_campaign(states: States) -> States:
-    """Return the same states as if all had been measured at the end of the campaign."""
-    row = None if states.row is None else np.full_like(states.row, states.row.max())
-    time_s = states.time_s
-    if time_s is not None:
-        time_s = np.full_like(time_s, time_s.max())
-    return replace(states, row=row, time_s=time_s)
-
-
-def _compute_left_out_fields(
-    model: Model, estimate: Estimate, covariance: np.ndarray, states: States
-) -> np.ndarray:
-    """Compute the pose errors of the end effector by effects that are in no command.
-
-    Returns (S, 6, 1 + D): the displacement and rotation by all of them together, then
-    the columns of a factor of its covariance, m and rad, base axes.
-    """
-    end_model, end_estimate = move_to_end_effector(model, estimate)
-    states = replace(states, session=np.zeros_like(states.session))
-    left_out = {
-        number
-        for number, effect in enumerate(model.effects)
-        if not is_commanded(effect)
-    }
-    chain = model.sites.chain
-    end_poses = []
-    for values in (end_estimate, zero_coefficients(end_estimate, left_out)):
-        coordinates = compute_displaced_coordinates(
-            end_model, values, evaluate_conditions(end_model, values, states)
-        )
-        end_poses.append(compute_poses(chain, coordinates, chain.end_effector))
-    displacement = compute_pose_differences(*end_poses[0], *end_poses[1])
-    keys = {model.effects[number].key for number in left_out}
-    columns = np.array(
-        [owner in keys for owner, _ in list_parameters(end_model, end_estimate)]
-    )
-    rows = np.array([owner in keys for owner, _ in list_parameters(model, estimate)])
-    sensitivities = linearize(
-        end_model,
-        end_estimate,
-        build_observations(states),
-        evaluate_conditions(end_model, end_estimate, states),
-    ).sensitivities[..., columns]
-    spread = sensitivities @ factor_covariance(covariance[np.ix_(rows, rows)])
-    return np.concatenate([displacement[..., None], spread], axis=2)

@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from elastocal.application.frames import FRAMES, ROBOT
+from elastocal.counting import format_count
 
 if TYPE_CHECKING:
     from elastocal.verdict import Accuracy, Verdict
@@ -63,6 +64,29 @@ def _format_bounded(accuracy: Accuracy, error_m: float, bound_m: float | None) -
         return size
     bound = format_millimetres(bound_m)
     return f"{size} ({100 * accuracy.confidence:g} % sure: below {bound})"
+
+
+def describe_left_out(verdict: Verdict) -> str:
+    """Describe how many rows and poses were left out as gross errors, and how the error
+    reads with them; empty if there are none."""
+    gross_errors = verdict.gross_errors
+    if not gross_errors:
+        return ""
+    rows = format_count(sum(len(error.rows) for error in gross_errors), "row")
+    poses = {(error.session, error.pose) for error in gross_errors}
+    farthest = format_millimetres(max(error.distance_m for error in gross_errors))
+    sentence = (
+        f"Left out as gross errors: {rows} of {format_count(len(poses), 'pose')},"
+        f" off by up to {farthest}"
+    )
+    with_all = verdict.heldout.with_gross_errors
+    if with_all is None:
+        return f"{sentence}; none of them at a validation pose."
+    return (
+        f"{sentence}; with them the model is off by"
+        f" {format_millimetres(with_all.after.rms_m)} RMS at validation poses, without"
+        f" them by {format_millimetres(verdict.heldout.after.rms_m)}."
+    )
 
 
 def tabulate_errors(verdict: Verdict) -> list[list[str]]:

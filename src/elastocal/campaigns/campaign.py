@@ -22,6 +22,9 @@ NO_REMAINDER = "none"
 BEST_REMAINDER = "auto"
 UNKNOWN = "unknown"
 NO_ROTATION = (0.0, 0.0, 0.0)
+# Standard deviation of each coordinate of a declared offset that states none, m: a
+# caliper on a bracket, or a drawing of the tool.
+OFFSET_STD_M = 2e-4
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,8 @@ class Target:
     name : name of the target.
     point : measuring point of the chain on which the target sits.
     offset_m : position in the frame of the point; None if unknown and fitted.
+    offset_std_m : standard deviation of each coordinate of a declared offset, which is
+        fitted with this prior; 0 if the offset is exact by definition.
     rotation : rotation vector (rad) from the frame of the point to the axes of the
         target, to which measured orientations refer; None if unknown and fitted. If it
         is left out, it is unknown if the offset is, else zero.
@@ -42,6 +47,12 @@ class Target:
     point: str
     offset_m: tuple[float, ...] | None
     rotation: tuple[float, ...] | None = ()
+    offset_std_m: float = 0.0
+
+    @property
+    def has_inexact_offset(self) -> bool:
+        """Whether the offset is declared, but not exact."""
+        return self.offset_m is not None and self.offset_std_m > 0.0
 
     def __post_init__(self) -> None:
         if self.rotation == ():
@@ -219,7 +230,10 @@ def parse_targets(
             raise InputError(source, f"targets.{name}.point", repr(point), allowed)
         offset_m = _parse_vector(target["offset_m"])
         rotation = _parse_vector(target.get("rotation", ()))
-        targets.append(Target(name, point, offset_m, rotation))
+        offset_std_m = 0.0
+        if offset_m is not None:
+            offset_std_m = float(target.get("offset_std_m", OFFSET_STD_M))
+        targets.append(Target(name, point, offset_m, rotation, offset_std_m))
     return tuple(targets)
 
 

@@ -237,7 +237,7 @@ def _read_cell(
 def _read_targets(descriptions: list[str], chain: Chain) -> tuple[Target, ...]:
     """Read targets on measuring points, ``POINT``, ``NAME:POINT`` or either with
     ``=x,y,z``, the known offset; each has a name of its own."""
-    from elastocal.campaigns.campaign import Target
+    from elastocal.campaigns.campaign import OFFSET_STD_M, Target
 
     targets: dict[str, Target] = {}
     for text in descriptions:
@@ -253,7 +253,7 @@ def _read_targets(descriptions: list[str], chain: Chain) -> tuple[Target, ...]:
         if offset is not None:
             numbers = parse_numbers("--target", offset, 3, FARTHEST_TARGET_M)
             offset_m = tuple(numbers.tolist())
-        targets[name] = Target(name, point, offset_m)
+        targets[name] = Target(name, point, offset_m, offset_std_m=OFFSET_STD_M)
     return tuple(targets.values())
 
 

@@ -132,7 +132,7 @@ def place_robustly(campaign: Campaign) -> Placement:
        Mining and Knowledge Discovery 12, 2006.
     """
     placement = place_measurements(campaign)
-    if campaign.frame == "base" and not placement.model.fitted_target_components:
+    if campaign.frame == "base" and not placement.model.has_unknown_targets:
         return placement
     for step in range(_CORE_STEPS + 1):
         distance = placement.distance

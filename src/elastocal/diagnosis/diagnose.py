@@ -14,6 +14,7 @@ import numpy as np
 
 from elastocal.counting import format_count
 from elastocal.data_checks.faults import find_faults
+from elastocal.data_checks.target_distances import compare_target_distances
 from elastocal.diagnosis import model_averaging, refit, verdict
 from elastocal.diagnosis.alarm import run_alarm_test
 from elastocal.diagnosis.candidate_design import build_candidate_design, refine_shapes
@@ -671,7 +672,10 @@ def _choose_model(
         full_model=declared,
         evidence=None,
         faults=data_faults,
-        warnings=tuple(subset.warnings),
+        warnings=(
+            *compare_target_distances(context.case.campaign),
+            *subset.warnings,
+        ),
         contradictions=(),
         repeatable=None,
         gross_errors=tuple(gross_errors),

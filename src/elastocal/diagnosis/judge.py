@@ -68,6 +68,7 @@ if TYPE_CHECKING:
 
     from elastocal.diagnosis.diagnose import Diagnosis, Step
     from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.noise import Noise
     from elastocal.verdict import Effect
 
     TransferredFit = tuple[Model, Estimate]
@@ -132,7 +133,11 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
     """
     outliers, kept, outside = remove_gross_errors(diagnosis, held_out)
     rows, heldout, warnings = compare_held_out_errors(
-        diagnosis.steps, diagnosis.case, kept, outside, seed
+        diagnosis.steps,
+        (diagnosis.case, kept),
+        outside,
+        parse_noise(diagnosis.document),
+        seed,
     )
     gross_errors = describe_gross_errors(outliers, held_out.campaign, held_out=True)
     for row in rows:
@@ -293,7 +298,11 @@ def remove_gross_errors(
 
 
 def compare_held_out_errors(
-    steps: Sequence[Step], case: Case, held_out: Case, outside: np.ndarray, seed: int
+    steps: Sequence[Step],
+    cases: tuple[Case, Case],
+    outside: np.ndarray,
+    measured_noise: Noise,
+    seed: int,
 ) -> tuple[list[dict[str, Any]], HeldOut, list[str]]:
     """Compare the errors of all steps on training and held-out poses.
 
@@ -301,12 +310,13 @@ def compare_held_out_errors(
     ----------
     steps
         Models from the frames to the final one.
-    case
-        Training poses.
-    held_out
-        Held-out poses without gross errors.
+    cases
+        Training poses, and held-out poses without gross errors.
     outside
         (P,) of bool, held-out poses outside the range of the fitted ones.
+    measured_noise
+        Noise that repeats show or the campaign states, which is the noise floor. What a
+        model leaves beyond it is an error of the model, and no noise.
     seed
         Seed of the bootstrap over poses.
 
@@ -319,9 +329,10 @@ def compare_held_out_errors(
     warnings : list of str
         Sentences.
     """
-    transferred, errors = _compute_step_errors(steps, case, held_out)
+    held_out = cases[1]
+    transferred, errors = _compute_step_errors(steps, *cases)
     declared = _find_declared(steps)
-    stream = open_stream(seed, case.campaign.name, "held-out poses", 0)
+    stream = open_stream(seed, cases[0].campaign.name, "held-out poses", 0)
     intervals, reductions = compute_error_intervals(
         errors, _REPLICATES, stream, declared
     )
@@ -329,7 +340,9 @@ def compare_held_out_errors(
         [errors[0], errors[-1]], _REPLICATES, stream
     )
     floor = compute_noise_floor(
-        steps[-1].fitted, held_out.observations, *transferred[-1]
+        replace(steps[-1].fitted, noise=measured_noise),
+        held_out.observations,
+        *transferred[-1],
     )
     rows = [
         _tabulate_step(step, step_errors.distance, limits, floor)
@@ -361,12 +374,15 @@ def compare_held_out_errors(
         with_gross_errors=None,
         delivered=after,
     )
-    warnings = [
-        *_warn_of_growth(heldout),
-        *_warn_of_extrapolation(outside),
-        *warn_of_repeated_poses(case.observations.states, states),
-    ]
-    return rows, heldout, warnings
+    return (
+        rows,
+        heldout,
+        [
+            *_warn_of_growth(heldout),
+            *_warn_of_extrapolation(outside),
+            *warn_of_repeated_poses(cases[0].observations.states, states),
+        ],
+    )
 
 
 def _tabulate_step(

@@ -68,6 +68,7 @@ class Settings:
     linearizations: int = _DEFAULT.linearizations
     relinearize_above: float = _DEFAULT.relinearize_above
     relinearize_noise: float = _DEFAULT.relinearize_noise
+    scatter_level: float = _DEFAULT.scatter_level
     largest_scatter: float = _DEFAULT.largest_scatter
     largest_pose_error_rad: float = _DEFAULT.largest_pose_error_rad
     negative_compliance: float = _DEFAULT.negative_compliance

@@ -26,7 +26,7 @@ from elastocal.diagnosis.verdict import (
     NAMED,
     SEVERAL,
     list_locations,
-    warn_of_scatter,
+    warn_of_excess_scatter,
 )
 from elastocal.fitting.model import get_joint_compliances
 from elastocal.verdict import (
@@ -138,7 +138,7 @@ def state_training_verdict(
         *result.warnings,
         *stated.warnings,
         *warn_of_compliances(final),
-        *warn_of_scatter(final.noise, result.noise, settings.relinearize_noise),
+        *warn_of_excess_scatter(final, result.noise, settings.scatter_level),
     ]
     for name, fitted in (("declared", declared), ("final", final)):
         if not fitted.converged:

@@ -21,10 +21,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import chdtrc, fdtrc
 
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.model_averaging import compute_extra_squares
 from elastocal.fitting.model import get_joint_compliances
+from elastocal.fitting.noise import count_effective_parameters
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -465,6 +467,41 @@ def describe_repeatable_residual(repeatable: RepeatableResidual | None) -> list[
     ]
 
 
+def warn_of_excess_scatter(final: Fit, measured: Noise, level: float) -> list[str]:
+    """Return a warning if the residuals of a model scatter more than the noise explains.
+
+    The noise of repeats, or the stated one, bounds what may count as noise: the mean
+    square of the residuals over it has a chi-squared distribution by chance, and an F
+    distribution if the noise is estimated from repeats (Snedecor and Cochran 1989).
+
+    Parameters
+    ----------
+    final : Fit
+        Fit of the model that is kept.
+    measured : Noise
+        Noise of the repeats, or declared noise.
+    level : float
+        Probability of a warning if the noise is as stated.
+    """
+    ratio = (final.noise.position_m / measured.position_m) ** 2
+    freedom = final.residual.size - count_effective_parameters(final)
+    if measured.source == "residual" or ratio <= 1.0 or freedom < 1.0:
+        return []
+    if measured.degrees_of_freedom:
+        repeats_freedom = 3.0 * measured.degrees_of_freedom / final.model.rows
+        chance = fdtrc(freedom, repeats_freedom, ratio)
+    else:
+        chance = chdtrc(freedom, freedom * ratio)
+    if chance >= level:
+        return []
+    (scatter,) = warn_of_scatter(final.noise, measured, 0.0)
+    return [
+        f"{scatter}, over {freedom:.0f} numbers, which chance makes in less than"
+        f" {100 * level:g} % of campaigns: what exceeds that noise repeats, and counts as"
+        " an error of the model"
+    ]
+
+
 def warn_of_scatter(residual_noise: Noise, measured: Noise, least: float) -> list[str]:
     """Return a warning if the residuals of a model scatter far more than the noise.
 
@@ -484,7 +521,7 @@ def warn_of_scatter(residual_noise: Noise, measured: Noise, least: float) -> lis
         reference = "their repeats about each other"
     else:
         reference = "the noise that is declared for them"
-    decimals = 0 if factor > 10 else 1
+    decimals = 0 if factor > 10 else 2 if factor < 1.5 else 1
     return [
         f"measurements scatter about the model {factor:.{decimals}f} times as much as {reference}"
     ]

@@ -64,7 +64,8 @@ class Model:
     ----------
     sites : Sites
     targets : tuple of Target
-        As in the campaign; offsets and rotations that they do not have are fitted.
+        As in the campaign; offsets and rotations that they do not have are fitted, and
+        so are declared offsets that are not exact, with their priors.
     fitted_frames : bool
         Whether the placement of the base is unknown, one for each session.
     rows : int
@@ -115,11 +116,21 @@ class Model:
         components x, y, z, rx, ry, rz."""
         components = []
         for index, target in enumerate(self.targets):
-            first = 0 if target.offset_m is None else 3
+            is_exact = target.offset_m is not None and not target.has_inexact_offset
+            first = 3 if is_exact else 0
             last = self.rows if target.rotation is None else 3
             if first < last:
                 components.append((index, slice(first, last)))
         return components
+
+    @property
+    def has_unknown_targets(self) -> bool:
+        """Whether any target has no declared offset, or no declared rotation although
+        rotations are measured."""
+        return any(
+            target.offset_m is None or (self.rows == 6 and target.rotation is None)
+            for target in self.targets
+        )
 
     def available_inputs(self, states: States) -> frozenset[str]:
         """Inputs of effects that states and campaign provide: see `Candidate.needs`."""
@@ -206,13 +217,15 @@ def build_nominal_model(model: Model) -> Model:
 
     It has the geometry of the robot file, and its springs only if the file states them:
     joints of unknown compliance are rigid, because typical compliances are a scale for
-    identification and would bend under declared masses. Only frames and targets are
-    fitted. Every error that is called "before" is the error of this model.
+    identification and would bend under declared masses. Only frames and unknown targets
+    are fitted; declared offsets stay as declared. Every error that is called "before" is
+    the error of this model.
     """
     compliance = model.nominal_compliance
     if not model.compliance_known:
         compliance = np.zeros_like(compliance)
-    return replace(model, effects=(), nominal_compliance=compliance)
+    targets = tuple(replace(target, offset_std_m=0.0) for target in model.targets)
+    return replace(model, targets=targets, effects=(), nominal_compliance=compliance)
 
 
 def list_parameters(model: Model, estimate: Estimate) -> list[tuple[str, Parameter]]:
@@ -230,8 +243,16 @@ def list_parameters(model: Model, estimate: Estimate) -> list[tuple[str, Paramet
             owner = f"frame {session}"
             parameters += [(owner, component) for component in components]
     for index, fitted in model.fitted_target_components:
-        owner = f"target {model.targets[index].name}"
-        parameters += [(owner, component) for component in components[fitted]]
+        target = model.targets[index]
+        owner = f"target {target.name}"
+        for component in components[fitted]:
+            if component.unit == "m" and target.has_inexact_offset:
+                component = replace(
+                    component,
+                    plausible=target.offset_std_m,
+                    prior_std=target.offset_std_m,
+                )
+            parameters.append((owner, component))
     for effect in model.effects:
         parameters += [(effect.key, parameter) for parameter in effect.parameters]
         for shape in effect.shapes:
@@ -275,15 +296,23 @@ def find_nonlinear_parameters(model: Model, estimate: Estimate) -> np.ndarray:
 def get_parameter_values(model: Model, estimate: Estimate) -> np.ndarray:
     """Present values of the parameters, (P,) array.
 
-    Frames and targets are fitted by steps and count as zero.
+    Frames and unknown targets are fitted by steps and count as zero. Declared offsets
+    that are not exact count from their declared values, as their priors do.
     """
     values = []
+    if model.fitted_frames:
+        values.append(np.zeros(6 * len(estimate.sessions)))
+    for index, fitted in model.fitted_target_components:
+        target = model.targets[index]
+        deviation = np.zeros(6)
+        if target.has_inexact_offset:
+            deviation[:3] = estimate.target_offset[index] - target.offset_m
+        values.append(deviation[fitted])
     for coefficients, shapes in zip(
         estimate.coefficients, estimate.shapes, strict=True
     ):
         values += [coefficients, shapes]
-    placement = len(list_parameters(model, estimate)) - sum(map(len, values))
-    return np.concatenate([np.zeros(placement), *values])
+    return np.concatenate([np.zeros(0), *values])
 
 
 def apply_step(model: Model, estimate: Estimate, step: np.ndarray) -> Estimate:

@@ -61,6 +61,14 @@ class States:
     def __len__(self) -> int:
         return len(self.pose)
 
+    def select(self, chosen: np.ndarray | slice) -> States:
+        """Select some of the states, in any order and any number of times."""
+        columns: dict[str, Any] = {
+            name: None if values is None else values[chosen]
+            for name, values in vars(self).items()
+        }
+        return States(**columns)
+
 
 @dataclass(frozen=True)
 class Observations:
@@ -363,12 +371,8 @@ def _select(
     `new_number` (S,) is the index of each old state among the selected ones.
     """
     rotation = observations.rotation
-    columns: dict[str, Any] = {
-        name: None if values is None else values[states]
-        for name, values in vars(observations.states).items()
-    }
     return Observations(
-        States(**columns),
+        observations.states.select(states),
         new_number[observations.state[indices]],
         observations.target[indices],
         observations.position[indices],

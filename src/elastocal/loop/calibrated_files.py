@@ -24,7 +24,7 @@ from elastocal.application.scope import (
     calibrate_on_case,
     set_form_error,
 )
-from elastocal.application.statements import tabulate_errors
+from elastocal.application.statements import describe_left_out, tabulate_errors
 from elastocal.campaigns.campaign_folder import CampaignFolder, read_campaign_folder
 from elastocal.diagnosis.misplaced import describe_reference_point
 from elastocal.errors import InputError
@@ -279,6 +279,7 @@ def build_certificate(
         "accuracy": to_document(accuracy),
         "point": describe_reference_point(campaign.case.campaign),
         "misplaced": to_document(verdict.misplaced),
+        "left_out": describe_left_out(verdict),
         "worst_pose": _describe_worst_pose(robot, commands[0], prediction.error_m),
         "conformity": asdict(decision)
         | {"configurations": heldout.configurations, "shortfalls": missing},
@@ -335,6 +336,6 @@ def compute_error_budget(
     optional = {
         "left by the regression": root_mean_square(remaining.regression_m),
         "form of the model": root_mean_square(remaining.form_m),
-        "not commanded": remaining.scope.left_out_m,
+        "not commanded": root_mean_square(remaining.left_out_m),
     }
     return budget | {name: rms_m for name, rms_m in optional.items() if rms_m}

@@ -26,7 +26,7 @@ from elastocal.io.json_files import read_json, write_json
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import read_table, write_table
 from elastocal.io.typed_json import from_document
-from elastocal.loop.schemas import STEPS, build_measurements_schema
+from elastocal.loop.schemas import MEASUREMENTS, STEPS
 from elastocal.mechanics.robot_file import parse_robot
 from elastocal.random_streams import open_stream
 from elastocal.verdict import TrainingVerdict
@@ -107,7 +107,7 @@ def load_case(
     if validation_key is not None and descriptions[validation_key]:
         described = descriptions[validation_key]
     joints = parse_robot(described["robot"], described["source"]).joints
-    schema = build_measurements_schema(joints)
+    schema = MEASUREMENTS.for_joints(joints)
     return build_case(described, read_table(measurements_path, schema))
 
 

@@ -15,7 +15,7 @@ from elastocal.io.json_files import write_json
 from elastocal.io.origin import describe_provenance
 from elastocal.io.plugins import REGRESSIONS, list_plugin_names
 from elastocal.io.storage import write_table
-from elastocal.loop.schemas import build_measurements_schema
+from elastocal.loop.schemas import MEASUREMENTS
 
 if TYPE_CHECKING:
     from typing import Any
@@ -45,7 +45,7 @@ def read_campaign(job: Any) -> None:
     ):
         write_table(
             path,
-            build_measurements_schema(measurements.joint_angles.shape[1]),
+            MEASUREMENTS.for_joints(measurements.joint_angles.shape[1]),
             [tabulate_measurements(measurements)],
             describe_provenance(descriptions, **job.wildcards),
         )

@@ -18,6 +18,7 @@ from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.holdout import list_poses
 from elastocal.counting import format_count, list_first
 from elastocal.data_checks.faults import find_faults, warn_of_computed_positions
+from elastocal.data_checks.target_distances import compare_target_distances
 from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.fitted_subset import select_initial_subset
 from elastocal.diagnosis.gross_errors import (
@@ -123,6 +124,7 @@ def inspect_campaign(folder: str | Path, robots_folder: str | Path) -> Overview:
     # misplaced frames would mistake it for one.
     if not data_faults and not negative:
         attention += _describe_misplaced_frames(declared, case)
+    attention += compare_target_distances(whole.campaign)
     attention += [*warn_of_computed_positions(case.campaign), *subset.warnings]
     if negative:
         attention.append(

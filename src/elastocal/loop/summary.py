@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from elastocal.io.data_frames import read_frame, write_csv
-from elastocal.loop.schemas import build_residuals_schema
+from elastocal.loop.schemas import RESIDUALS
 from elastocal.random_streams import open_stream
 from elastocal.validation.held_out import (
     PositionErrors,
@@ -35,7 +35,7 @@ def summarize_campaigns(job: Any) -> None:
     }
     held_out = {}
     for name, path in zip(settings.campaigns, job.input.residuals, strict=True):
-        schema = build_residuals_schema(len(verdicts[name].noise.joint_rad))
+        schema = RESIDUALS.for_joints(len(verdicts[name].noise.joint_rad))
         held_out[name] = read_frame(path, schema).query("held_out and not gross_error")
     write_csv(
         job.output.table,

@@ -29,7 +29,7 @@ from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import write_table
 from elastocal.loop.diagnosis_tables import load_case, restore_diagnosis
 from elastocal.loop.loading import load_campaign
-from elastocal.loop.schemas import build_residuals_schema
+from elastocal.loop.schemas import RESIDUALS
 from elastocal.validation.held_out import compute_position_residuals
 from elastocal.validation.transfer import transfer_fit
 from elastocal.verdict import write_verdict
@@ -59,7 +59,7 @@ def judge_campaign(job: Any) -> None:
     write_csv(job.output.before_after, pd.DataFrame(judgement.rows))
     write_table(
         job.output.residuals,
-        build_residuals_schema(case.campaign.robot.joints),
+        RESIDUALS.for_joints(case.campaign.robot.joints),
         generate_residual_blocks(diagnosis, judgement),
         describe_provenance(job.params, **job.wildcards),
     )
@@ -136,20 +136,20 @@ def build_calibrated_robot(
     residual = compute_position_residuals(
         *transfer_fit(final, case, held_out), held_out.observations
     )
-    noise_m = final.noise.position_m
+    # What the model leaves beyond this noise counts as an error of the robot.
+    noise_m = diagnosis.verdict.noise.position_m
     regression = None
     spread = delivered.choice.spread if delivered is not None else None
-    if delivered is not None and delivered.predictor is not None and spread is not None:
-        noise_m = diagnosis.verdict.noise.position_m
-        if not physics_only:
-            residual = delivered.residual
-            regression = build_residual_model(
-                case,
-                final.estimate,
-                delivered.predictor,
-                spread.typical,
-                noise_m,
-            )
+    if (
+        delivered is not None
+        and delivered.predictor is not None
+        and spread is not None
+        and not physics_only
+    ):
+        residual = delivered.residual
+        regression = build_residual_model(
+            case, final.estimate, delivered.predictor, spread.typical, noise_m
+        )
     robot = calibrate_on_case(
         case, final.model, final.estimate, final.covariance, final.noise, regression
     )

@@ -1,9 +1,5 @@
-"""Components of a displacement and of a wrench: the name, unit and meaning that all
-tables and files use."""
+"""Components of a displacement and of a wrench, by the names that all tables and files
+use."""
 
-COMPONENTS = (
-    *((f"d{axis}", "m", f"displacement along base {axis}") for axis in "xyz"),
-    *((f"r{axis}", "rad", f"rotation vector about base {axis}") for axis in "xyz"),
-)
-COMPONENT_NAMES = tuple(name for name, _, _ in COMPONENTS)
+COMPONENT_NAMES = ("dx", "dy", "dz", "rx", "ry", "rz")
 WRENCH_NAMES = ("fx", "fy", "fz", "mx", "my", "mz")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal import __version__
-from elastocal.application.statements import tabulate_errors
+from elastocal.application.statements import describe_left_out, tabulate_errors
 from elastocal.counting import format_integer, pluralize
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.effects.catalogue import list_effects
@@ -127,6 +127,7 @@ def render_campaign_sentences(
         effects=effects,
         faulty=bool(verdict.faults),
         accuracy=verdict.accuracy,
+        left_out=describe_left_out(verdict),
         ends=[_format_interval(step) for step in steps if step["kind"] != "frames"],
         new_poses=len({(row["effect"], row["pose"]) for row in experiment}),
         version=__version__,

@@ -58,6 +58,7 @@ def _describe_campaign(name: str, verdict: Verdict) -> list[str]:
     return [
         f"{mark} {name}: {stated['sentences'][0]}",
         *(f"  {line}" for line in stated["headline_line"]),
+        *(f"  {line}" for line in stated["left_out"]),
     ]
 
 

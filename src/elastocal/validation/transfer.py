@@ -85,7 +85,12 @@ def place_unseen_sessions(fitted: Fit, observations: Observations) -> Estimate:
         return estimate
     rotations = Rotation.from_matrix(estimate.target_rotation).as_rotvec()
     known_targets = tuple(
-        replace(target, offset_m=tuple(offset), rotation=tuple(rotation))
+        replace(
+            target,
+            offset_m=tuple(offset),
+            rotation=tuple(rotation),
+            offset_std_m=0.0,
+        )
         for target, offset, rotation in zip(
             fitted.model.targets, estimate.target_offset, rotations, strict=True
         )

@@ -49,7 +49,7 @@ class Experiment:
 def build_campaign_document(name: str, arm: Arm, design: Design) -> dict[str, Any]:
     """Build the contents of campaign.yaml, which do not depend on the defects."""
     targets = {
-        f"{point}": {"point": point, "offset_m": [0, 0, 0]}
+        f"{point}": {"point": point, "offset_m": [0, 0, 0], "offset_std_m": 0}
         for point in design.points or arm.points
     }
     document = {

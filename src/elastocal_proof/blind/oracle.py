@@ -154,7 +154,7 @@ def fit_oracle(
     p_value = min(variants * _compute_wald_p_value(fitted, candidates), 1.0)
     outside = find_extrapolated_poses(fitted, case, held_out)
     _, heldout, _ = compare_held_out_errors(
-        [Step("oracle", "declared", fitted)], case, held_out, outside, seed
+        [Step("oracle", "declared", fitted)], (case, held_out), outside, noise, seed
     )
     return _describe_outcome(candidates, p_value, to_document(heldout.declared))
 

@@ -34,7 +34,7 @@ from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import Columns, read_table, write_table
 from elastocal.loop.diagnosis_tables import refit_step, serialize_diagnosis
 from elastocal.loop.loading import read_described_campaign
-from elastocal.loop.schemas import build_measurements_schema
+from elastocal.loop.schemas import MEASUREMENTS
 from elastocal.mechanics.robot_file import parse_robot
 from elastocal.random_streams import open_stream
 from elastocal.residual_model.regressions import REGRESSIONS
@@ -114,7 +114,7 @@ def load_data_set(
     joints = parse_robot(descriptions["robot"], descriptions["source"]).joints
     return DataSet(
         descriptions,
-        read_table(measurements_path, build_measurements_schema(joints)),
+        read_table(measurements_path, MEASUREMENTS.for_joints(joints)),
         read_table(folds_path, FOLDS),
     )
 
@@ -292,7 +292,7 @@ def deal_league_folds(job: Any) -> None:
     origin = describe_provenance(job.params, **job.wildcards)
     draws = open_stream(job.params.seed, job.wildcards.data, "league folds", 0)
     folds = deal_folds(measured, job.params.folds, draws)
-    schema = build_measurements_schema(measured.joint_angles.shape[1])
+    schema = MEASUREMENTS.for_joints(measured.joint_angles.shape[1])
     columns = tabulate_measurements(measured)
     write_table(job.output.measurements, schema, [columns], origin)
     write_table(job.output.folds, FOLDS, [folds], origin)

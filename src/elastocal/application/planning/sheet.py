@@ -101,7 +101,10 @@ def build_campaign_document(
     targets = {}
     for target in survey.targets:
         offset_m = "unknown" if target.offset_m is None else list(target.offset_m)
-        targets[target.name] = {"point": target.point, "offset_m": offset_m}
+        described: dict[str, Any] = {"point": target.point, "offset_m": offset_m}
+        if target.offset_m is not None:
+            described["offset_std_m"] = target.offset_std_m
+        targets[target.name] = described
     noise = {"position_m": survey.position_m}
     if survey.measured == "pose":
         noise["orientation_rad"] = survey.orientation_rad
