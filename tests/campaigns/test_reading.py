@@ -345,3 +345,33 @@ def test_a_load_without_wrench_columns_is_refused(cell):
         cell.measurements, "line 6, column load", "found '1'", "no columns fx"
     ):
         cell.read()
+
+
+def test_a_clock_that_is_set_back_once_is_refused(cell):
+    """By an hour at the end of summer time, by a day at midnight."""
+    count = len(cell.table["pose"])
+    rising = 60.0 * np.arange(count)
+    for set_back_s in (3600.0, 86400.0):
+        late = np.arange(count) >= count // 2
+        cell.table["time_s"] = [*(rising - set_back_s * late + 1e5)]
+        with refused(
+            cell.folder / "measurements.csv",
+            f"line {count // 2 + 2}",
+            "not set back",
+            "add the hour",
+        ):
+            cell.read()
+    for fall_s in (600.0, 20000.0):
+        # Neither an hour nor a day: the order of the file is another one.
+        cell.table["time_s"] = [*(rising - fall_s * late + 1e5)]
+        cell.read()
+
+
+def test_a_file_that_lists_one_target_after_the_other_has_no_clock_set_back(cell):
+    count = len(cell.table["pose"])
+    order = np.argsort(cell.table["target"], kind="stable")
+    for name, column in cell.table.items():
+        cell.table[name] = [column[row] for row in order]
+    half = 3500.0 / (count // 2 - 1) * np.arange(count // 2)
+    cell.table["time_s"] = [*half, *half]
+    cell.read()

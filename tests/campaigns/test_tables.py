@@ -29,6 +29,9 @@ AMBIGUOUS = "x;y\n1,234;22,500\n"
         # tested in tests/fuzz/test_dialects.py.
         (AMBIGUOUS, {"dialect": Dialect(decimal="comma")}, X),
         ("x;y\n1,234;0,500\n", {}, X),
+        # Spaces between thousands, wide, narrow or not to be broken.
+        ("x;y\n-1 203,114;1\u00a0000\n", {}, {"x": ("-1203.114",), "y": ("1000",)}),
+        ("x;y\n1\u202f203,1;1 2\n", {}, {"x": ("1203.1",), "y": ("1 2",)}),
         ("# x;y\n1.234;2\n", {"dialect": Dialect(header=1)}, X),
         ("x;y;n;n\n1.234;2;1,5;1.2.3\n", {"ignored": ["n"]}, X),
         # The header is a comment; a header that is no comment takes precedence.

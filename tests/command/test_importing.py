@@ -115,3 +115,55 @@ def test_a_target_of_several_in_a_row_needs_three_columns(refusal, tmp_path):
     targets = ("--target", "A=X,Y", "--target", "B=U,V,W")
     message = refusal("import", "csv", table, "--folder", tmp_path / "cell", *targets)
     assert "found A=X,Y" in message
+
+
+SHEET = """pose,load,repeat,target,done,q1_deg,q1,x,y,z
+1,0,0,smr,,57.296,1.0,,,
+2,0,0,smr,,114.592,2.0,,,
+"""
+TRACKER = """Name;X [mm];Y [mm];Z [mm];Time
+P1;1 203,114;-88,021;1 410,556;09:14:22
+P2;1 204,114;-88,021;1 410,556;09:15:22
+"""
+
+
+@pytest.fixture
+def sheet(tmp_path):
+    (tmp_path / "cell").mkdir()
+    path = tmp_path / "cell" / "measurements.csv"
+    path.write_text(SHEET)
+    return path
+
+
+def test_a_tracker_without_joint_angles_fills_the_planned_sheet(
+    elastocal, refusal, tmp_path, sheet
+):
+    tracker = tmp_path / "tracker.csv"
+    tracker.write_text(TRACKER)
+    arguments = ("import", "csv", tracker, "--folder", tmp_path / "cell")
+    message = refusal(*arguments)
+    assert "line 2 is pose 1" in message and "--join order" in message
+    assert sheet.read_text() == SHEET
+    for options in (("--join", "order"), ("--column", "pose=Name", "--force")):
+        result = elastocal(*arguments, *options)
+        assert result.exit_code == 0, result.exception
+        assert "line 2 is pose 1, load 0, repeat 0, target smr" in result.output
+        header, first, second = sheet.read_text().splitlines()
+        assert header == "pose,load,repeat,target,q1,x,y,z,time_s"
+        assert first.startswith("1,0,0,smr,1.0,1.203") and first.endswith(",33262.0")
+        assert second.startswith("2,0,0,smr,2.0,1.204")
+
+
+def test_joint_angles_come_from_a_file_of_their_own(elastocal, refusal, tmp_path):
+    joints = tmp_path / "joints.csv"
+    joints.write_text("Nr,J1\n1,10\n2,20\n")
+    tracker = tmp_path / "tracker.txt"
+    tracker.write_text("2 1.5 2 3\n1 1.0 2 3\n")
+    arguments = ["import", "csv", tracker, "--folder", tmp_path / "cell"]
+    arguments += ["--joints", joints, "--columns", "Nr,x,y,z", *OPTIONS]
+    result = elastocal(*arguments)
+    assert result.exit_code == 0, result.exception
+    assert "rows joined to" in result.output and "by 'Nr'" in result.output
+    rows = (tmp_path / "cell" / "measurements.csv").read_text().splitlines()
+    assert rows[1].split(",")[4].startswith("0.349")
+    assert "--joints FILE" in refusal("import", "csv", joints, "--folder", tmp_path)

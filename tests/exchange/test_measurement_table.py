@@ -148,13 +148,13 @@ def test_several_targets_of_a_row_are_read_from_stated_columns(tmp_path):
             [1683195633.0, 1683195693.0],
         ),
         ("1600000000.0|1600000002.0", [1.6e9, 1600000002.0]),
-        # Milliseconds since 1970 are no seconds; which of two days it is nobody knows.
+        # Milliseconds since 1970 are no seconds; which of two dates it is nobody knows.
         *(
             (cells, None)
             for cells in (
                 "1600000000000|1600000002000",
                 "05/04/2023 10:20|06/04/2023 10:20",
-                "10:20:33|10:21:33",
+                "10:20:33|2023-05-04",
             )
         ),
     ],

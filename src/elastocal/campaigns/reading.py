@@ -46,6 +46,10 @@ _GROSS_ERROR_SHARE = 0.2
 # Positions that spread over more than this multiple of the reach are not in metres.
 # Positions in millimetres do, unless all lie within a few centimetres.
 _LARGEST_SPREAD_REACHES = 10.0
+# A clock is set back by an hour or a day. This much time, at most, passes between two
+# measurements of a session.
+_SET_BACK_S = (3600.0, 86400.0)
+_BETWEEN_S = 900.0
 # Distance of a target from its measuring point, if no offset is stated. Few targets sit
 # farther away.
 _UNKNOWN_OFFSET_M = 1.0
@@ -276,6 +280,7 @@ def _check_measurements(
     _refuse_undeclared_loads(measurements, table)
     _refuse_poses_of_different_angles(measurements, table, robot)
     _refuse_millimetres(measurements, table, robot, targets)
+    _refuse_clocks_set_back(measurements, table)
     if measurements.rotation_vector is not None:
         _refuse_large_rotations(measurements.rotation_vector, table)
 
@@ -328,6 +333,47 @@ def _refuse_poses_of_different_angles(
         earlier = table.locate(first[pose[row]])
         allowed = f"within {SAME_POSE_RAD} rad of {earlier}, which is of the same pose"
         table.refuse(apart, names, allowed)
+
+
+def _refuse_clocks_set_back(measurements: Measurements, table: Cells) -> None:
+    """Refuse times of a session that fall once by about an hour, as at the end of summer
+    time, or a day, as the time of day does at midnight, and rise otherwise.
+
+    A file that lists one target after the other at the same poses begins again without
+    a wrong clock.
+    """
+    if measurements.time_s is None:
+        return
+    pose = list_poses(measurements)[1]
+    for session in np.unique(measurements.session):
+        rows = np.flatnonzero(measurements.session == session)
+        fall = _find_set_back(np.diff(measurements.time_s[rows]))
+        if fall is None:
+            continue
+        before, after = rows[: fall + 1], rows[fall + 1 :]
+        if len(np.intersect1d(pose[before], pose[after])) > 1:
+            continue
+        earlier_s = measurements.time_s[before[-1]]
+        raise table.fault(
+            int(after[0]),
+            "time_s",
+            "a clock that is not set back: add the hour or the day to the later times",
+            f"{measurements.time_s[after[0]]:.15g} after {earlier_s:.15g}",
+        )
+
+
+def _find_set_back(steps: np.ndarray) -> int | None:
+    """Find the only one of the steps of time (N,), s, that falls, if it falls as a clock
+    that is set back."""
+    falls = np.flatnonzero(steps < 0.0)
+    if len(falls) != 1:
+        return None
+    largest_rise = np.delete(steps, falls[0]).max(initial=0.0)
+    for set_back_s in _SET_BACK_S:
+        between_s = steps[falls[0]] + set_back_s
+        if 0.0 <= between_s <= _BETWEEN_S and largest_rise < set_back_s - _BETWEEN_S:
+            return int(falls[0])
+    return None
 
 
 def _refuse_millimetres(

@@ -45,6 +45,11 @@ _DECIMAL_NUMBER = {
 _CERTAIN_DECIMAL_COMMA = re.compile(
     rf"(?![+-]?[1-9]\d{{0,2}},\d{{3}}$){_DECIMAL_NUMBER['comma'].pattern}", re.ASCII
 )
+# A number with spaces between thousands, as ISO 80000-1 writes it. A tabulator or a
+# line break is none of these spaces.
+_SPACED_NUMBER = re.compile(
+    r"[+-]?\d{1,3}(?:[ \u00a0\u2009\u202f]\d{3})+(?:[.,]\d+)?", re.ASCII
+)
 HEADER_WITHOUT_ROWS = "a header alone"
 # Upper bounds on the size of a text table. The whole table is in memory, as text and
 # as cells, which takes up to some 2 GB at these bounds.
@@ -350,6 +355,7 @@ def read_text_table(  # noqa: PLR0913 - independent options
         allowed = "one row for each measurement"
         raise InputError(source, "", HEADER_WITHOUT_ROWS, allowed)
     columns = _collect_columns(rows, header, ignored, source)
+    columns = _join_thousands(columns)
     line_numbers = [number for number, _ in rows]
     decimal = stated.decimal or _find_decimal(
         columns, line_numbers, header.separator, source
@@ -602,6 +608,17 @@ def _find_decimal(
         )
         raise InputError(source, f"line {comma[0]}", repr(comma[1]), allowed)
     return "comma"
+
+
+def _join_thousands(
+    columns: Mapping[str, tuple[str, ...]],
+) -> dict[str, tuple[str, ...]]:
+    """Return the same cells without the spaces in numbers such as 1 203,114."""
+
+    def convert(cell: str) -> str:
+        return "".join(cell.split()) if _SPACED_NUMBER.fullmatch(cell) else cell
+
+    return {name: tuple(map(convert, cells)) for name, cells in columns.items()}
 
 
 def _with_decimal_points(

@@ -28,7 +28,7 @@ from elastocal.counting import format_count
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
-    from elastocal.exchange.measurement_table import ImportedMeasurements
+    from elastocal.exchange.measurement_table import ImportedMeasurements, OtherFile
     from elastocal.exchange.robot_text import ImportedRobot
 
 importing = typer.Typer(name="import", no_args_is_help=True)
@@ -176,6 +176,18 @@ def csv(
         int | None,
         Option(min=1, max=MOST_ROWS, help="Line with the names. Default: found out."),
     ] = None,
+    joints: Annotated[
+        Path | None,
+        Option(help="File with the joint angles, if the table has positions alone."),
+    ] = None,
+    join: Annotated[
+        str | None,
+        Option(
+            help="How positions are joined to joint angles: COLUMN that both have, time,"
+            " or order. Default: by pose, load, repeat and target, or the only column"
+            " that both have."
+        ),
+    ] = None,
     robot: Annotated[
         Path | None,
         Option(
@@ -191,8 +203,10 @@ def csv(
     Columns are found by their usual names (q1 or J1 or Axis 1, x, y, z, qw .. qz, r11
     .. r33, t11 .. t34, fx .. mz, pose, load, repeat, target, time) or as the robot's
     file calls its joints, units by brackets or endings ("X [mm]", x_mm). What is
-    ambiguous is asked for. Poses, loads and repeats are counted where no column numbers
-    them. The end of the output states what was read, how, and what was left out.
+    ambiguous is asked for. Positions without joint angles are joined to the sheet that
+    `elastocal plan` wrote into the folder, or to the file of --joints. Poses, loads and
+    repeats are counted where no column numbers them. The end of the output states what
+    was read, how, and what was left out.
     """
     from rich.console import Console
 
@@ -200,6 +214,7 @@ def csv(
     from elastocal.campaigns.reading import read_robot
     from elastocal.exchange.measurement_table import (
         ImportOptions,
+        OtherFile,
         read_measurement_table,
     )
     from elastocal.io.atomic_writes import write_together
@@ -218,12 +233,16 @@ def csv(
         skip_empty=skip_empty,
         ignore=ignore or [],
         targets=target_columns,
+        join=join,
         names=[name.strip() for name in names.split(",")] if names else (),
     )
     declared_targets, declared_robot = _read_declared(folder)
     robot_file = robot or declared_robot
     imported = read_measurement_table(
-        file, options, read_robot(robot_file) if robot_file else None
+        file,
+        options,
+        read_robot(robot_file) if robot_file else None,
+        OtherFile(joints) if joints else _find_sheet(folder),
     )
     with write_together(folder, (CSV,)) as partial:
         write_measurements(partial / CSV, imported.table, imported.joints)
@@ -262,6 +281,24 @@ def _check_replaceable(folder: Path, *, force: bool) -> None:
             "measurements that are there already",
             "another folder, or --force to replace measurements.csv",
         )
+
+
+def _find_sheet(folder: Path) -> OtherFile | None:
+    """Find the sheet of a plan in a folder; None if it has no rows."""
+    from elastocal.campaigns.measurements import CSV, find_files
+    from elastocal.exchange.measurement_table import OtherFile
+
+    for path in find_files(folder, CSV):
+        if _count_rows(path):
+            return OtherFile(path, is_sheet=True)
+    return None
+
+
+def _count_rows(path: Path) -> int:
+    """Count the lines of a table below its header and its comments."""
+    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    rows = [line for line in lines if line.strip() and not line.startswith("#")]
+    return max(len(rows) - 1, 0)
 
 
 def _is_filled(path: Path) -> bool:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -19,9 +18,9 @@ import numpy as np
 import pandas as pd
 
 from elastocal.campaigns.holdout import number_close_points
-from elastocal.campaigns.tables import Cells, TextTable
+from elastocal.campaigns.tables import Cells, TextTable, read_text_table
 from elastocal.counting import format_count
-from elastocal.errors import InputError, find_text_fault
+from elastocal.errors import InputError, find_text_fault, suggest_names
 from elastocal.exchange.column_names import (
     POSITION,
     VECTOR,
@@ -35,6 +34,7 @@ from elastocal.exchange.column_names import (
     has_position,
     recognize_column,
 )
+from elastocal.exchange.joining import join_files, join_to_sheet
 from elastocal.exchange.pose_table import (
     PoseTable,
     TableOptions,
@@ -42,16 +42,14 @@ from elastocal.exchange.pose_table import (
     read_cells,
     read_rotation_vectors,
 )
+from elastocal.exchange.times import find_times_of_day, read_times
 from elastocal.io.storage import Columns
-from elastocal.io.texts import parse_number
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 
 # Joint angles that differ by less, rad, belong to one pose: a controller reports one
 # standstill twice within this tolerance, and poses of a plan lie degrees apart.
 SAME_POSE = 1e-3
-# Upper bound on a number in a column of times; nanoseconds since 1970 are 2e18.
-_LARGEST_TIME = 1e19
 # What programs write into a cell without a measurement.
 _EMPTY = re.compile(
     r"|[+-]?nan(\(\w+\))?|[-–—]+|#?n/?a|n\.a\.|null|none", re.IGNORECASE
@@ -72,12 +70,14 @@ class ImportOptions(TableOptions):
         exerts have their signs changed.
     skip_empty : whether rows without a position are left out.
     targets : headers of x, y and z by the names of the targets, if a row holds several.
+    join : how rows are joined to the joint angles of another file, see `joining`.
     """
 
     target: str | None = None
     wrench: str = "on-robot"
     skip_empty: bool = False
     targets: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    join: str | None = None
 
 
 @dataclass(frozen=True)
@@ -113,8 +113,44 @@ class _OptionalColumns:
     notes: list[str]
 
 
+@dataclass(frozen=True)
+class OtherFile:
+    """Where the joint angles of positions are.
+
+    Attributes
+    ----------
+    path : file with the joint angles.
+    is_sheet : whether it is a sheet of `elastocal plan`, with names and units of
+        measurements.csv; it counts only if the positions come without joint angles.
+    """
+
+    path: Path
+    is_sheet: bool = False
+
+
+@dataclass(frozen=True)
+class _Source:
+    """Cells with all columns of measurements, from one file or two.
+
+    Attributes
+    ----------
+    text : the cells.
+    headers : headers that are stated, by name.
+    units : units that are stated, by name.
+    notes : how the cells were understood.
+    """
+
+    text: TextTable
+    headers: dict[str, str]
+    units: dict[str, str]
+    notes: list[str]
+
+
 def read_measurement_table(
-    path: str | Path, options: ImportOptions, robot: Robot | None = None
+    path: str | Path,
+    options: ImportOptions,
+    robot: Robot | None = None,
+    joint_file: OtherFile | None = None,
 ) -> ImportedMeasurements:
     """Read measurements from a table of another program.
 
@@ -124,6 +160,7 @@ def read_measurement_table(
     options : how it is read
     robot : robot that was measured. Columns may have the names of its joints, and there
         must be a column for each joint.
+    joint_file : file of the joint angles, if the table has the positions alone.
 
     Raises
     ------
@@ -132,21 +169,11 @@ def read_measurement_table(
         cell is not a number, or not a rotation: the error has its line and column.
     """
     check_option_names(options)
-    target_headers = set[str]().union(*options.targets.values())
-    text = read_cells(path, options, target_headers)
-    notes = []
-    if text.units:
-        notes.append(f"units in the row under the header: {len(text.units)}")
-    headers = find_euler_columns(text, options.rotation) | dict(options.columns)
-    if options.targets:
-        text = _split_targets(text, options.targets)
-        first_headers = next(iter(options.targets.values()))
-        headers |= dict(zip(POSITION, first_headers, strict=True))
-        headers["target"] = "target"
-        notes += [
-            f"{name} has {', '.join(map(repr, columns))}"
-            for name, columns in options.targets.items()
-        ]
+    source = _read_source(path, options, robot, joint_file)
+    text = source.text
+    headers = source.headers
+    options = replace(options, units={**options.units, **source.units})
+    notes = source.notes
     layout = _find_layout(text, headers, options, robot)
     units = find_units(
         text,
@@ -188,6 +215,102 @@ def read_measurement_table(
         (*ignored, *options.ignore),
         len(text.lines) - len(rows),
         (*notes, *optional.notes),
+    )
+
+
+def _read_source(
+    path: str | Path,
+    options: ImportOptions,
+    robot: Robot | None,
+    joint_file: OtherFile | None,
+) -> _Source:
+    """Read the cells of a table, a row for each target, and join them to the joint
+    angles if these are in another file."""
+    target_headers = set[str]().union(*options.targets.values())
+    dialect = options
+    if joint_file is not None and not joint_file.is_sheet:
+        names = options.names if _name_positions(options) else ()
+        dialect = replace(options, names=names, ignore=())
+    text = read_cells(path, dialect, target_headers)
+    notes = []
+    if text.units:
+        notes.append(f"units in the row under the header: {len(text.units)}")
+    headers = find_euler_columns(text, options.rotation) | dict(options.columns)
+    if options.targets:
+        text = _split_targets(text, options.targets)
+        first_headers = next(iter(options.targets.values()))
+        headers |= dict(zip(POSITION, first_headers, strict=True))
+        headers["target"] = "target"
+        notes += [
+            f"{name} has {', '.join(map(repr, columns))}"
+            for name, columns in options.targets.items()
+        ]
+    source = _Source(text, headers, {}, notes)
+    if joint_file is None:
+        return source
+    if joint_file.is_sheet:
+        return _join_sheet(source, options, robot, joint_file.path)
+    other = _read_joint_angles(joint_file.path, options)
+    joined = join_files(text, other, options.join, skip_empty=options.skip_empty)
+    text = _leave_out(joined.text, options.ignore)
+    return _Source(text, headers, {}, notes + joined.notes)
+
+
+def _read_joint_angles(path: Path, options: ImportOptions) -> TextTable:
+    """Read the cells of a file of joint angles."""
+    names = () if _name_positions(options) else options.names
+    return read_cells(path, replace(options, names=names, ignore=(), header=None))
+
+
+def _name_positions(options: ImportOptions) -> bool:
+    """Whether the stated names of columns are those of positions."""
+    return has_position([recognize_column(name)[0] for name in options.names])
+
+
+def _leave_out(text: TextTable, headers: Sequence[str]) -> TextTable:
+    """Leave out columns of a table; an unknown one is refused."""
+    for header in headers:
+        if header not in text.columns:
+            allowed = suggest_names(header, [*text.columns])
+            raise InputError("--ignore", "", f"no column {header!r}", allowed)
+    columns = {
+        header: cells for header, cells in text.columns.items() if header not in headers
+    }
+    return replace(text, columns=columns)
+
+
+def _join_sheet(
+    source: _Source, options: ImportOptions, robot: Robot | None, path: Path
+) -> _Source:
+    """Join positions to a planned sheet if they come without joint angles."""
+    text = source.text
+    present = {
+        name: header
+        for name, header in source.headers.items()
+        if header in text.columns
+    }
+    columns, _ = find_columns(text, present, robot)
+    if find_joints(columns):
+        return source
+    sheet = read_text_table(path, lambda cells: "pose" in cells)
+    joined = join_to_sheet(
+        text,
+        sheet,
+        columns,
+        options.target,
+        options.join,
+        skip_empty=options.skip_empty,
+    )
+    joints = find_joints(joined.columns)
+    units = {
+        name: "m" if robot and robot.chain.prismatic[number] else "rad"
+        for number, name in enumerate(joints)
+    }
+    return _Source(
+        joined.text,
+        source.headers | joined.columns,
+        units,
+        source.notes + joined.notes,
     )
 
 
@@ -299,8 +422,15 @@ def _check_complete(layout: PoseTable, robot: Robot | None) -> None:
                 path,
                 "header",
                 f"no column {', '.join(missing)}",
-                f"--column {missing[0]}=NAME; {unused}",
+                f"--column {missing[0]}=NAME{_describe_other_file(missing)}; {unused}",
             )
+
+
+def _describe_other_file(missing: Sequence[str]) -> str:
+    """Say how positions of another file are joined, if these are missing."""
+    if "x" in missing:
+        return ", or the table of positions with --joints FILE for this one"
+    return ""
 
 
 def _no_angles_error(layout: PoseTable, robot: Robot | None, unused: str) -> InputError:
@@ -312,8 +442,8 @@ def _no_angles_error(layout: PoseTable, robot: Robot | None, unused: str) -> Inp
         layout.text.path,
         "header",
         "no joint angles",
-        f"columns q1, q2 …{joint_names}, --column q1=NAME, or --robot FILE with"
-        f" joint_names; {unused}",
+        f"columns q1, q2 …{joint_names}, --column q1=NAME, --robot FILE with joint_names,"
+        f" --joints FILE that has them, or a planned sheet in --folder; {unused}",
     )
 
 
@@ -395,7 +525,13 @@ def _read_optional_columns(
                 options.units,
             )
             cells = layout.text.cells({name: header}, find_scales(unit), rows)
-            values = _read_times(cells) if name == "time_s" else cells.numbers(name)
+            if name == "time_s":
+                values = read_times(cells)
+                if find_times_of_day(cells.texts(name)):
+                    note = f"{header!r} is a time of day: it counts from the midnight before"
+                    optional.notes.append(note)
+            else:
+                values = cells.numbers(name)
         except InputError as error:
             if name in headers or name in options.units or name == "u95_m":
                 raise InputError(
@@ -410,28 +546,6 @@ def _read_optional_columns(
             optional.columns[name] = values
             optional.units.update(unit)
     return optional
-
-
-def _read_times(cells: Cells) -> np.ndarray:
-    """Read times, ndarray (N,), s.
-
-    Times are numbers, or dates of ISO 8601, which count from 1970; a date without a
-    time zone is in UTC.
-    """
-    texts = cells.texts("time_s")
-    numbers = [parse_number(text, _LARGEST_TIME) for text in texts]
-    if None not in numbers:
-        seconds = np.array(numbers, float) * cells.scales["time_s"]
-        return cells.bounded("time_s", seconds)
-    with suppress(ValueError, OverflowError):
-        dates = pd.to_datetime(pd.Series(texts), format="ISO8601", utc=True)
-        # Pandas reads plain numbers as years too.
-        are_dates = all("-" in text or "/" in text for text in texts)
-        if dates.notna().all() and are_dates:
-            return (dates - pd.Timestamp(0, tz="UTC")).dt.total_seconds().to_numpy()
-    raise cells.fault(
-        numbers.index(None), "time_s", "numbers, or dates as 2023-05-04 10:20:33"
-    )
 
 
 def _read_targets(cells: Cells, stated_name: str | None) -> np.ndarray:
