@@ -129,7 +129,17 @@ def write_table(
     InputError
         If a column is missing or unknown, or a value is not finite or out of range.
     """
-    fields = pa.schema([_arrow_field(column) for column in schema.columns])
+    fields = pa.schema(
+        [
+            pa.field(
+                column.name,
+                _arrow_type(column),
+                nullable=False,
+                metadata={"unit": column.unit, "meaning": column.meaning},
+            )
+            for column in schema.columns
+        ]
+    )
     is_float = {
         column.name: column.type.startswith("float") for column in schema.columns
     }
@@ -280,11 +290,6 @@ def _constant_value(
         value: str | float = statistics.min
         return value
     return None
-
-
-def _arrow_field(column: Column) -> pa.Field:
-    metadata = {"unit": column.unit, "meaning": column.meaning}
-    return pa.field(column.name, _arrow_type(column), nullable=False, metadata=metadata)
 
 
 def _arrow_type(column: Column) -> pa.DataType:

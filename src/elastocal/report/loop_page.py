@@ -57,7 +57,11 @@ def build_loop_page(
         against, and corners, joints and axes of the robot (m).
     """
     count = len(table["x"])
-    shown = _select_measurements(table)
+    shown = np.arange(count)
+    if count > _MAX_MEASUREMENTS:
+        # The selection is spread evenly and has the worst measurement.
+        spread = _spread(count, _MAX_MEASUREMENTS - 1)
+        shown = np.unique([*spread, find_worst_measurement(table)])
     selection = {name: values[shown] for name, values in table.items()}
     position = np.column_stack([selection[name] for name in "xyz"])
     residuals_um = {stage: _stack_residuals_um(selection, stage) for stage in _STAGES}
@@ -79,15 +83,6 @@ def build_loop_page(
         "shown": [] if len(shown) == count else [len(shown), count],
     }
     return page, data
-
-
-def _select_measurements(table: Columns) -> np.ndarray:
-    """Return the rows that the page shows, evenly spread and with the worst one."""
-    count = len(table["x"])
-    if count <= _MAX_MEASUREMENTS:
-        return np.arange(count)
-    spread = _spread(count, _MAX_MEASUREMENTS - 1)
-    return np.unique([*spread, find_worst_measurement(table)])
 
 
 def _draw_poses(selection: Columns, robot: Robot) -> dict[str, Any]:

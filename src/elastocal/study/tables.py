@@ -270,8 +270,8 @@ def _evaluate_score(
     }
 
 
-# Columns of a table that may have no rows.
-_EXTENDED_COLUMNS = [
+# Columns of the table of robots with elastic links, which may have no rows.
+_EXTENDED_COLUMNS = (
     "strategy",
     "initial_mean_mm",
     "initial_mean_mm_std_error",
@@ -280,7 +280,7 @@ _EXTENDED_COLUMNS = [
     "share_compensated_percent",
     "share_compensated_percent_std_error",
     "robot",
-]
+)
 
 
 def build_extended_table(
@@ -290,20 +290,17 @@ def build_extended_table(
     rows = []
     for robot, strategy in product(robots, [*strategies]):
         cell = results.get_row(robot, strategy)
-        share, share_error = results.compute_share_compensated(robot, strategy)
-        rows.append(
-            {
-                "strategy": strategy,
-                "initial_mean_mm": MILLI * cell.initial_deviation,
-                "initial_mean_mm_std_error": MILLI * cell.initial_deviation_std_error,
-                "residual_mean_um": MICRO * cell.deviation,
-                "residual_mean_um_std_error": MICRO * cell.deviation_std_error,
-                "share_compensated_percent": share,
-                "share_compensated_percent_std_error": share_error,
-                "robot": robot,
-            }
+        row = (
+            strategy,
+            MILLI * cell.initial_deviation,
+            MILLI * cell.initial_deviation_std_error,
+            MICRO * cell.deviation,
+            MICRO * cell.deviation_std_error,
+            *results.compute_share_compensated(robot, strategy),
+            robot,
         )
-    return pd.DataFrame(rows, columns=_EXTENDED_COLUMNS)
+        rows.append(row)
+    return pd.DataFrame(rows, columns=[*_EXTENDED_COLUMNS])
 
 
 def merge_errors(frame: pd.DataFrame, digits: int = 3) -> pd.DataFrame:
