@@ -9,7 +9,7 @@ import pytest
 
 from elastocal.command import demo, main
 
-STEPS = ["plan", "check", "diagnose", "correct", "certificate"]
+STEPS = ["plan", "check", "diagnose", "correct", "certificate", "verify"]
 ERRORS = {
     "uncorrected": np.full(3, 2e-3),
     "corrected": np.full(3, 1e-4),
@@ -28,6 +28,7 @@ def run_demo(elastocal, monkeypatch, tmp_path):
     monkeypatch.setattr(f"{rehearsal}.fill_sheet", lambda *_: 12)
     monkeypatch.setattr(f"{rehearsal}.write_milling_path", lambda *_: 50)
     monkeypatch.setattr(f"{rehearsal}.measure_errors", lambda *_: ERRORS)
+    monkeypatch.setattr(f"{rehearsal}.measure_targets", lambda *_: 50)
     monkeypatch.setattr(demo, "find_workplace", lambda: tmp_path)
     monkeypatch.setattr(
         "elastocal.campaigns.campaign_folder.read_campaign_folder",
@@ -50,12 +51,12 @@ def run_demo(elastocal, monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("failing_step", "exit_code"), [("certificate", 0), ("diagnose", 3)]
+    ("failing_step", "exit_code"), [("verify", 0), ("diagnose", 3)]
 )
 def test_the_printed_commands_are_run_until_a_step_fails(
     run_demo, failing_step, exit_code
 ):
-    """The certificate may fail."""
+    """The verification may fail, as the certificate may."""
     result, noted = run_demo(failing_step)
     assert result.exit_code == exit_code
     steps = [arguments[0] for arguments in noted]
@@ -66,7 +67,7 @@ def test_the_printed_commands_are_run_until_a_step_fails(
 
 
 def test_the_answer_compares_the_errors_and_tells_the_hidden_defects(run_demo):
-    result, _ = run_demo("certificate")
+    result, _ = run_demo("verify")
     assert "✓" in result.stderr
     assert "2.00 mm RMS before, 0.100 mm after" in result.stderr
     assert "hidden in it: gear transmission error of joint" in result.stderr

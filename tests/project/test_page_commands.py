@@ -28,6 +28,7 @@ AFTER_A_DIAGNOSIS = (
     "elastocal correct",
     "elastocal export",
     "elastocal diagnose",
+    "elastocal verify",
 )
 
 

@@ -2,13 +2,16 @@
 
     rehearse.py measure FOLDER                 fill the measurement sheet of a campaign
     rehearse.py path FOLDER PATH.csv           write a path of 50 poses, as for milling
+    rehearse.py remeasure FOLDER OUT.csv MEASURED.csv
+                                               measure the robot at corrected targets
     rehearse.py move FOLDER PATH.csv OUT.csv   follow it, uncorrected and corrected
 
-FOLDER is the campaign; PATH.csv has the wanted poses and OUT.csv the joint targets of
-`elastocal correct`. The robot follows from the robot file of the campaign, --seed and
---effect, and is the same in all three. Errors of `move` are those that the tracker
-measures in the campaign's base frame. The last line gives the errors that the noise of
-the tracker and the repeatability of the robot cause alone.
+FOLDER is the campaign; PATH.csv has the wanted poses, OUT.csv the joint targets of
+`elastocal correct`, and MEASURED.csv is for `elastocal verify`. The robot follows from
+the robot file of the campaign, --seed and --effect, and is the same in all of them.
+Errors of `move` are those that the tracker measures in the campaign's base frame. The
+last line gives the errors that the noise of the tracker and the repeatability of the
+robot cause alone.
 """
 
 import argparse
@@ -25,6 +28,7 @@ from elastocal_proof.blind.rehearsal import (
     describe_hidden_effects,
     fill_sheet,
     measure_errors,
+    measure_targets,
     misplace_base,
     write_milling_path,
 )
@@ -43,6 +47,13 @@ def path(given, robot, campaign):
     print(f"{count} poses in {given.path}")
 
 
+def remeasure(given, robot, campaign):
+    count = measure_targets(
+        given.targets, given.measured, campaign.document, robot, given.seed
+    )
+    print(f"{count} measurements in {given.measured}")
+
+
 def move(given, robot, campaign):
     errors_m = measure_errors(given.path, given.targets, robot, given.seed)
     rms = {name: 1e3 * np.sqrt((error**2).mean()) for name, error in errors_m.items()}
@@ -59,13 +70,15 @@ if __name__ == "__main__":
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     subcommands = parser.add_subparsers(required=True)
-    for run in (measure, path, move):
+    for run in (measure, path, remeasure, move):
         command = subcommands.add_parser(run.__name__)
         command.add_argument("folder", type=Path)
-        if run is not measure:
+        if run in (path, move):
             command.add_argument("path", type=Path)
-        if run is move:
+        if run in (remeasure, move):
             command.add_argument("targets", type=Path)
+        if run is remeasure:
+            command.add_argument("measured", type=Path)
         command.add_argument("--seed", type=int, default=1)
         command.add_argument(
             "--effect",

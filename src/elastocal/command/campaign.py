@@ -13,6 +13,9 @@ from typer import Argument, Option
 
 from elastocal.command.terminal import (
     MOST_ROWS,
+    ForceOption,
+    LengthsOption,
+    TargetsOption,
     find_pipeline,
     find_robots_folder,
     find_workplace,
@@ -134,17 +137,34 @@ def diagnose(
         int,
         Option("--cores", "-j", min=1, max=MOST_ROWS, help="Jobs that run at a time."),
     ] = 2,
+    measured: Annotated[
+        Path | None,
+        Option(
+            "--with",
+            help="Measurements at corrected targets, as elastocal verify takes them. A"
+            " new campaign beside this one, NAME_round2, has both and is diagnosed.",
+        ),
+    ] = None,
+    targets: TargetsOption = None,
+    lengths: LengthsOption = None,
+    force: ForceOption = False,
 ) -> None:
     """Find which effects the robot's model lacks; write the report.
 
     The report compares the error before and after on held-out poses. It is the
-    Snakemake target `diagnose` of this campaign.
+    Snakemake target `diagnose` of this campaign. With --with it goes round the loop
+    again: the measurements of the corrected robot are joined to the campaign as a
+    further session, in a new folder.
     """
     from rich.console import Console
 
     from elastocal.campaigns.campaign_folder import check_workflow_path
 
     console = Console(stderr=True)
+    if measured is not None:
+        folder = _join_measurements(
+            folder, measured, targets, lengths, console, force=force
+        )
     campaign = str(folder.resolve())
     check_workflow_path(campaign)
     workplace = find_workplace()
@@ -170,6 +190,38 @@ def diagnose(
     if nothing_to_do and not process.returncode:
         _print_outcome(folder, workplace, console)
     raise typer.Exit(process.returncode)
+
+
+def _join_measurements(
+    folder: Path,
+    measured: Path,
+    targets: Path | None,
+    lengths: str | None,
+    console: Console,
+    *,
+    force: bool,
+) -> Path:
+    """Write a campaign with the measurements of this one and those at its corrected
+    targets; return its folder."""
+    from elastocal.campaigns.campaign_folder import read_campaign_folder
+    from elastocal.io.replacement import check_replaceable, note_written_files
+    from elastocal.loop import verification
+    from elastocal.loop.loading import read_described_campaign
+
+    campaign_folder = read_campaign_folder(folder, find_robots_folder())
+    _, campaign = read_described_campaign(campaign_folder)
+    output, name = verification.name_next_round(campaign_folder)
+    targets_path = targets or measured.with_name(verification.TARGETS)
+    files = verification.list_round_files(campaign_folder, output)
+    inputs: list[str | Path] = [*campaign_folder.files(), measured, targets_path]
+    check_replaceable(files, inputs, find_workplace(), force=force)
+    read = verification.read_verification(measured, targets_path, campaign, lengths)
+    remarks = verification.join_measurements(campaign_folder, *read, output, name)
+    note_written_files(files, find_workplace())
+    count = format_count(len(read[1]), "measurement")
+    lines = [f"{output}: {folder} with {count} of the corrected robot"]
+    print_lines([*lines, *(f"! {remark}" for remark in remarks)], console)
+    return output
 
 
 def _print_outcome(folder: Path, workplace: Path, console: Console) -> None:

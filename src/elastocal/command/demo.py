@@ -1,4 +1,4 @@
-"""`elastocal demo`: the whole way, from a plan to a certificate, on a simulated
+"""`elastocal demo`: the whole way, from a plan to a verification, on a simulated
 robot."""
 
 import shlex
@@ -49,8 +49,8 @@ def demo(
     """Go the whole way on a simulated KUKA, in about a minute.
 
     A physical simulation with hidden defects stands in for the robot: it is planned
-    for, measured, checked, diagnosed, corrected and certified by the commands that a
-    real robot needs, which are printed. Nothing but this package is needed.
+    for, measured, checked, diagnosed, corrected, certified and verified by the commands
+    that a real robot needs, which are printed. Nothing but this package is needed.
     """
     from rich.console import Console
 
@@ -63,6 +63,7 @@ def demo(
         describe_hidden_effects,
         fill_sheet,
         measure_errors,
+        measure_targets,
         write_milling_path,
     )
 
@@ -70,6 +71,7 @@ def demo(
     robot_file = find_robots_folder() / "kuka.yaml"
     path = folder / "path.csv"
     targets = folder / "targets.csv"
+    measured = folder / "measured.csv"
     robot, defects = build_hidden_robot(
         robot_file, seed, effect or ["transmission_harmonic"]
     )
@@ -94,6 +96,12 @@ def demo(
     write_milling_path(path, read_robot(robot_file), robot, seed)
     run("correct", folder, path, "--output", targets)
     run("certificate", folder, "--tolerance", "0.2mm", may_fail=True)
+    count = format_count(
+        measure_targets(targets, measured, document, robot, seed), "target"
+    )
+    note = f"# The corrected robot is measured: {count} in {measured}"
+    print_lines(["", note], console)
+    run("verify", folder, measured, may_fail=True)
     errors_mm = {
         name: 1e3 * root_mean_square(errors)
         for name, errors in measure_errors(path, targets, robot, seed).items()

@@ -18,6 +18,7 @@ from elastocal.command.export import export
 from elastocal.command.importing import importing
 from elastocal.command.plan import plan
 from elastocal.command.terminal import format_example
+from elastocal.command.verify import verify
 from elastocal.errors import InputError, describe_system_fault
 
 # Each subcommand with the words of an example, in the order in which a calibration needs
@@ -30,6 +31,7 @@ COMMANDS: dict[Callable[..., None], str] = {
     diagnose: "campaigns/cell",
     correct: "campaigns/cell path.csv --output targets.csv",
     certificate: "campaigns/cell --tolerance 0.2mm",
+    verify: "campaigns/cell measured.csv",
     export: "campaigns/cell --output calibrated",
 }
 
@@ -68,7 +70,8 @@ def with_version(
 ) -> None:
     """From a robot and a laser tracker to a corrected robot.
 
-    The order of the work: plan, measure, check, diagnose, correct, certificate.
+    The order of the work: plan, measure, check, diagnose, correct, certificate,
+    verify.
     """
     if version:
         typer.echo(f"elastocal {elastocal.__version__}")

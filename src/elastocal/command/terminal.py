@@ -83,6 +83,13 @@ DecimalOption = Annotated[
     Literal["point", "comma"] | None,
     Option(help="Mark of decimals. Default: found out."),
 ]
+TargetsOption = Annotated[
+    Path | None,
+    Option(
+        help="CSV that elastocal correct wrote. Default: targets.csv beside the"
+        " measurements."
+    ),
+]
 _SNAKEFILE = "Snakefile"
 # Where a wheel installs the Snakefile, rules and configuration; see `data-files` in
 # pyproject.toml.

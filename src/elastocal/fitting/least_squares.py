@@ -791,7 +791,7 @@ def register_to_poses(
             )
             for number in range(len(sessions)):
                 members = session == number
-                rotation[number], position[number] = _align_points(
+                rotation[number], position[number] = align_points(
                     points[members], observations.position[members]
                 )
         in_base = _rotate_back(
@@ -851,7 +851,7 @@ def _extrapolate_fixed_point(
     return extrapolated.reshape(rounds[-1][1].shape)
 
 
-def _align_points(
+def align_points(
     points: np.ndarray, measured: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Rotation (3, 3) and translation (3,) from points (N, 3) to measured ones, by the

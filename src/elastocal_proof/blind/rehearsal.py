@@ -73,6 +73,8 @@ _PATH_POSES = 50
 _MAX_POSTURES = 200
 # Largest step of a joint along a path; a larger one is a jump to another posture.
 _MAX_STEP_RAD = 0.1
+# Difference of the seed of a verification from that of its campaign.
+_VERIFIED_LATER = 1000
 # Relative error of a moment that is rounding.
 _MOMENT_ROUNDING = 1e-6
 
@@ -206,7 +208,7 @@ def fill_sheet(
         )
     states = sheet.drop_duplicates(_STATE)
     schedule = _build_schedule(robot.arm, states, seed, source)
-    position, rotation = _read_targets(robot, schedule, document)
+    position, rotation = _read_targets(robot, schedule, document, seed)
     rows = (
         pd.MultiIndex.from_frame(states[_STATE]).get_indexer(
             pd.MultiIndex.from_frame(sheet[_STATE])
@@ -220,20 +222,74 @@ def fill_sheet(
     return len(sheet)
 
 
+def measure_targets(
+    targets: Path,
+    output: Path,
+    document: Mapping[str, Any],
+    robot: SimulatedRobot,
+    seed: int,
+) -> int:
+    """Command the robot to corrected targets, and write what the tracker measures of the
+    reflector on its end effector.
+
+    Parameters
+    ----------
+    targets : path
+        Joint targets as `elastocal correct` wrote them.
+    output : path
+        CSV of the measurements; an existing file is replaced.
+    document : mapping
+        Contents of campaign.yaml.
+    robot : SimulatedRobot
+        The robot that is measured.
+    seed : int
+        Seed of `fill_sheet`, whose reflectors stay where they are. Noise and
+        repeatability are new ones.
+
+    Returns
+    -------
+    int
+        Number of measurements.
+    """
+    check_places(output)
+    table = _read_table(targets)
+    source = targets.as_posix()
+    angle_names = _name_angles(robot.arm.joints)
+    require_numbers(table, [*angle_names, *WRENCH_NAMES], source)
+    states = table[[*angle_names, *WRENCH_NAMES]].assign(
+        pose=np.arange(1, len(table) + 1), load=0, repeat=0
+    )
+    schedule = _build_schedule(robot.arm, states, seed + _VERIFIED_LATER, source)
+    position, rotation = _read_targets(robot, schedule, document, seed)
+    end = robot.arm.points[-1]
+    names = [name for name, at in document["targets"].items() if at["point"] == end]
+    column = list(document["targets"]).index(names[0])
+    measured = states[["pose", "repeat"]].assign(target=names[0])
+    measured[["x", "y", "z"]] = position[:, column]
+    if document["measured"] == "pose":
+        measured[["rx", "ry", "rz"]] = to_rotation_vector(rotation[:, column])
+    _write_table(output, measured)
+    return len(measured)
+
+
 def _read_targets(
-    robot: SimulatedRobot, schedule: Schedule, document: Mapping[str, Any]
+    robot: SimulatedRobot,
+    schedule: Schedule,
+    document: Mapping[str, Any],
+    reflector_seed: int,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Read all targets of a campaign in each state: positions (S, targets, 3), m, and
-    rotations (S, targets, 3, 3), in the campaign's frame."""
+    rotations (S, targets, 3, 3), in the campaign's frame. `reflector_seed` is the seed
+    of unknown offsets and rotations."""
     points = []
     offsets = []
     rotation_vectors = []
     for name, target in document["targets"].items():
         points.append(robot.arm.points.index(target["point"]))
-        draws = open_simulation_stream(schedule.seed, f"reflector {name}")
+        draws = open_simulation_stream(reflector_seed, f"reflector {name}")
         offsets.append(_draw_if_unknown(target["offset_m"], _MAX_OFFSET_M, draws))
         mount = target.get("rotation", np.zeros(3))
-        draws = open_simulation_stream(schedule.seed, f"mount {name}")
+        draws = open_simulation_stream(reflector_seed, f"mount {name}")
         rotation_vectors.append(_draw_if_unknown(mount, _MAX_ROTATION_RAD, draws))
     position, rotation = simulate_poses(robot, schedule)
     position = (

@@ -1,0 +1,521 @@
+"""Verify a corrected robot against measurements at its corrected targets, and join these
+measurements to the campaign for another diagnosis."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import asdict, dataclass, replace
+from datetime import date
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elastocal import __version__
+from elastocal.application.accuracy import predict_errors
+from elastocal.application.frames import BASE, ROBOT, root_mean_square
+from elastocal.application.verification import (
+    CommandedTargets,
+    add_noise_to_bound,
+    check_prediction,
+    compute_measured_errors,
+    draw_measured_rms,
+    find_remaining_error,
+    list_verification_shortfalls,
+    predict_over_targets,
+)
+from elastocal.campaigns.campaign import DOCUMENT, average_by_group
+from elastocal.campaigns.holdout import number_configurations
+from elastocal.campaigns.measurements import (
+    CSV,
+    ROTATION,
+    describe_columns,
+    read_measurements,
+)
+from elastocal.campaigns.writing import write_campaign
+from elastocal.errors import InputError
+from elastocal.exchange.measured_targets import (
+    CorrectedTargets,
+    TargetMeasurements,
+    read_corrected_targets,
+    read_target_measurements,
+)
+from elastocal.io.atomic_writes import write_text, write_together
+from elastocal.io.documents import LARGEST_BYTES
+from elastocal.io.records import compute_sha256
+from elastocal.io.texts import read_text
+from elastocal.loop.loading import read_described_campaign
+from elastocal.mechanics.components import WRENCH_NAMES
+from elastocal.validation.conformity import PASS, UNDECIDED, decide_conformity
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from elastocal.application.accuracy import ErrorPrediction
+    from elastocal.application.calibrated import CalibratedRobot
+    from elastocal.application.verification import (
+        MeasuredErrors,
+        PredictionTest,
+        RemainingError,
+    )
+    from elastocal.campaigns.campaign import Campaign, Measurements, Target
+    from elastocal.campaigns.campaign_folder import CampaignFolder
+    from elastocal.loop.calibrated_files import DiagnosedCampaign
+    from elastocal.mechanics.robot import Robot
+
+# Name of the table that `elastocal correct` writes, beside the measurements.
+TARGETS = "targets.csv"
+# Robot file of a campaign whose robot is not one of the project's.
+_ROBOT = "robot.yaml"
+# End of the name of a campaign with the measurements of a verification.
+_ROUND = re.compile(r"(.+)_round(\d+)")
+# Largest relative difference of a stated error from that of the present diagnosis that
+# is rounding.
+_SAME_ERROR = 1e-3
+# Share of the measured RMS error in the base frame that a placement must leave at most,
+# so that the frame is suspected instead of the robot.
+_FRAME_SHARE = 0.5
+# Columns of campaigns that the measurements of a verification have only if their table
+# states them.
+_CONDITIONS = ("time_s", "temperature_c", "u95_m")
+
+
+@dataclass(frozen=True)
+class Verification:
+    """A verified robot.
+
+    Attributes
+    ----------
+    document : contents of verification.json.
+    table : one row for each target.
+    """
+
+    document: dict[str, Any]
+    table: pd.DataFrame
+
+
+def read_verification(
+    path: Path, targets_path: Path, campaign: Campaign, lengths: str | None
+) -> tuple[CorrectedTargets, TargetMeasurements]:
+    """Read corrected targets and what was measured at them.
+
+    Parameters
+    ----------
+    path, targets_path : files of the measurements and of the targets.
+    campaign : the campaign by which the targets were corrected.
+    lengths : unit of lengths whose header states none; None for metres.
+    """
+    robot = campaign.robot
+    targets = read_corrected_targets(targets_path, robot.joints)
+    names = [target.name for target in _find_end_targets(campaign)]
+    if not names:
+        end = robot.chain.end_effector.name
+        allowed = f"a campaign with a target on {end}, the point that is corrected"
+        raise InputError(path, "", "measurements of another point", allowed)
+    measured = read_target_measurements(path, targets, robot, names, lengths or "m")
+    return targets, measured
+
+
+def _find_end_targets(campaign: Campaign) -> list[Target]:
+    """Find the targets on the end effector, those at a stated offset first."""
+    end = campaign.robot.chain.end_effector.name
+    targets = [target for target in campaign.targets if target.point == end]
+    return sorted(targets, key=lambda target: target.offset_m is None)
+
+
+def verify_campaign(
+    campaign: DiagnosedCampaign,
+    targets: CorrectedTargets,
+    measured: TargetMeasurements,
+    files: dict[str, Path],
+    tolerance_m: float | None,
+    accepted_risk: float,
+) -> Verification:
+    """Compare the measured errors of a corrected robot with the predicted ones.
+
+    Parameters
+    ----------
+    campaign : the campaign by which the targets were corrected.
+    targets, measured : as `read_verification` returns them.
+    files : the files of both, by their roles, for their digests.
+    tolerance_m : largest allowed RMS position error, m; None if nothing is certified.
+    accepted_risk : accepted probability of a wrong decision.
+    """
+    target = _choose_target(campaign.case.campaign, measured)
+    robot = campaign.calibrated.robot
+    commanded = _average_measurements(robot, targets, measured, target.name)
+    comparison = _compare(campaign, commanded, target)
+    certificate = None
+    if tolerance_m is not None:
+        certificate = _certify(comparison, tolerance_m, accepted_risk)
+    document = (
+        {
+            "campaign": campaign.name,
+            "robot": robot.name,
+            "serial": campaign.folder.document.get("serial_number", ""),
+            "date": date.today().isoformat(),
+            "version": __version__,
+            "origin": campaign.origin,
+            "files": campaign.folder.digests
+            | {role: compute_sha256(path) for role, path in files.items()},
+            "target": target.name,
+            "offset_fitted": target.offset_m is None,
+            "not_measured": int(targets.usable.sum()) - len(commanded),
+        }
+        | _describe_errors(comparison, accepted_risk)
+        | {"certificate": certificate}
+    )
+    return Verification(document, _tabulate(comparison))
+
+
+@dataclass(frozen=True)
+class _Comparison:
+    """Measured and predicted errors of commanded targets.
+
+    Attributes
+    ----------
+    calibrated : the robot.
+    targets : the targets.
+    errors : measured errors.
+    sensor_m : (N,) standard deviation of the tracker's noise in a coordinate.
+    now : predicted errors by the present diagnosis, in the frame of the campaign.
+    prediction, remaining : results of the tests.
+    measured_rms_m : (draws,) RMS errors of the robot at targets like these.
+    """
+
+    calibrated: CalibratedRobot
+    targets: CommandedTargets
+    errors: MeasuredErrors
+    sensor_m: np.ndarray
+    now: ErrorPrediction
+    prediction: PredictionTest
+    remaining: RemainingError
+    measured_rms_m: np.ndarray
+
+
+def _compare(
+    campaign: DiagnosedCampaign, targets: CommandedTargets, target: Target
+) -> _Comparison:
+    """Compare measured with predicted errors."""
+    calibrated = campaign.calibrated
+    noise = calibrated.noise
+    errors = compute_measured_errors(
+        targets,
+        _relate_to_end_effector(target, campaign),
+        base_known=calibrated.scope.frame == BASE,
+    )
+    sensor_m = noise.position_m / np.sqrt(targets.repeats)
+    # A noise that is only known from the residual contains errors of the robot.
+    subtracted_m = sensor_m if noise.source != "residual" else 0.0 * sensor_m
+    predicted_rms_m, repeated_m = predict_over_targets(calibrated, targets, errors.free)
+    return _Comparison(
+        calibrated,
+        targets,
+        errors,
+        sensor_m,
+        predict_errors(calibrated, targets.joint_angles, targets.wrench),
+        check_prediction(errors, predicted_rms_m, targets.bound_m, sensor_m),
+        find_remaining_error(errors, repeated_m, sensor_m),
+        draw_measured_rms(
+            errors, targets.configuration, subtracted_m, noise.degrees_of_freedom
+        ),
+    )
+
+
+def _certify(
+    comparison: _Comparison, tolerance_m: float, accepted_risk: float
+) -> dict[str, Any]:
+    """Decide on a tolerance by the measured and by the predicted errors of the same
+    targets."""
+    measured = decide_conformity(comparison.measured_rms_m, tolerance_m, accepted_risk)
+    shortfalls = list_verification_shortfalls(comparison.targets, comparison.errors)
+    if shortfalls and measured.decision == PASS:
+        measured = replace(measured, decision=UNDECIDED)
+    predicted = decide_conformity(comparison.now.rms_m, tolerance_m, accepted_risk)
+    return {
+        "predicted": asdict(predicted),
+        "measured": asdict(measured),
+        "shortfalls": shortfalls,
+    }
+
+
+def _describe_errors(comparison: _Comparison, accepted_risk: float) -> dict[str, Any]:
+    """Return the errors of a verification as part of its document."""
+    targets = comparison.targets
+    distance_m = comparison.errors.distance_m
+    worst = int(np.argmax(distance_m))
+    frame = comparison.calibrated.scope.frame
+    noise = comparison.calibrated.noise
+    measured_rms_m = comparison.measured_rms_m
+    return {
+        "frame": frame,
+        "targets": len(targets),
+        "measurements": int(targets.repeats.sum()),
+        "configurations": int(targets.configuration.max()) + 1,
+        "before_rms_m": root_mean_square(targets.before_m),
+        "predicted_rms_m": root_mean_square(targets.after_m),
+        "measured_rms_m": root_mean_square(distance_m),
+        "robot_rms_m": root_mean_square(measured_rms_m),
+        "robot_bound_m": float(np.quantile(measured_rms_m, 1.0 - accepted_risk)),
+        "accepted_risk": accepted_risk,
+        "worst": {
+            "number": int(targets.number[worst]),
+            "error_m": float(distance_m[worst]),
+        },
+        "noise": {
+            "source": noise.source,
+            "position_m": noise.position_m,
+            "rms_m": float(np.sqrt(3.0 * (comparison.sensor_m**2).mean())),
+        },
+        "prediction": asdict(comparison.prediction),
+        "remaining": asdict(comparison.remaining),
+        "remarks": [
+            *_remark_on_targets(targets, comparison.now.error_m),
+            *_remark_on_frame(targets, comparison.errors, frame),
+        ],
+    }
+
+
+def _choose_target(campaign: Campaign, measured: TargetMeasurements) -> Target:
+    """Choose the target on the end effector whose errors are stated."""
+    present = set(measured.target.tolist())
+    return next(
+        target for target in _find_end_targets(campaign) if target.name in present
+    )
+
+
+def _relate_to_end_effector(
+    target: Target, campaign: DiagnosedCampaign
+) -> tuple[float, ...] | None:
+    """Return the offset of a target from the corrected point, in its frame; None if it
+    is unknown."""
+    if target.offset_m is None:
+        return None
+    point = campaign.calibrated.robot.chain.end_effector.offset_m
+    return tuple(np.subtract(target.offset_m, point).tolist())
+
+
+def _average_measurements(
+    robot: Robot, targets: CorrectedTargets, measured: TargetMeasurements, name: str
+) -> CommandedTargets:
+    """Average the repeated measurements of one reflector at each target."""
+    selected = measured.select(measured.target == name)
+    row, group = np.unique(selected.row, return_inverse=True)
+    angles = targets.joint_angles[row]
+    configuration = number_configurations(
+        robot.model_angles(angles), np.arange(len(row))
+    )
+    return CommandedTargets(
+        row + 1,
+        angles,
+        targets.wrench[row],
+        targets.position[row],
+        targets.rotation[row],
+        targets.before_m[row],
+        targets.after_m[row],
+        targets.bound_m[row],
+        average_by_group(selected.position, group),
+        np.bincount(group),
+        configuration,
+    )
+
+
+def _remark_on_targets(targets: CommandedTargets, error_m: np.ndarray) -> list[str]:
+    """Remark that the targets were corrected by another diagnosis than the present."""
+    same = np.isclose(targets.after_m, error_m, rtol=_SAME_ERROR, atol=1e-9)
+    if same.all():
+        return []
+    return [
+        "the targets were corrected by another diagnosis of this campaign or another"
+        " version: the test refers to the present one"
+    ]
+
+
+def _remark_on_frame(
+    targets: CommandedTargets, errors: MeasuredErrors, frame: str
+) -> list[str]:
+    """Remark that most of the measured error is that of the base frame."""
+    if frame == ROBOT:
+        return []
+    placed = compute_measured_errors(
+        replace(targets, measured=targets.position + errors.error),
+        (0.0, 0.0, 0.0),
+        base_known=False,
+    )
+    rms_m = root_mean_square(errors.distance_m)
+    placed_m = root_mean_square(placed.distance_m)
+    if placed_m > _FRAME_SHARE * rms_m:
+        return []
+    return [
+        f"after the best placement of the base {1e3 * placed_m:.3f} mm of the measured"
+        f" {1e3 * rms_m:.3f} mm are left: the tracker's frame is not that of the campaign"
+    ]
+
+
+def _tabulate(comparison: _Comparison) -> pd.DataFrame:
+    """Tabulate predicted and measured errors by target."""
+    import pandas as pd
+
+    targets = comparison.targets
+    errors = comparison.errors
+    bound_m = add_noise_to_bound(targets.bound_m, comparison.sensor_m)
+    return pd.DataFrame(
+        {
+            "target": targets.number,
+            "x": targets.position[:, 0],
+            "y": targets.position[:, 1],
+            "z": targets.position[:, 2],
+            "predicted_error_before_m": targets.before_m,
+            "predicted_error_after_m": targets.after_m,
+            "predicted_bound_m": targets.bound_m,
+            "bound_with_noise_m": bound_m,
+            "measured_error_m": errors.distance_m,
+            "measured_dx_m": errors.error[:, 0],
+            "measured_dy_m": errors.error[:, 1],
+            "measured_dz_m": errors.error[:, 2],
+            "measurements": targets.repeats,
+        }
+    )
+
+
+def name_next_round(folder: CampaignFolder) -> tuple[Path, str]:
+    """Return folder and name of the campaign of the next round: cell_round2 beside cell,
+    and cell_round3 after that."""
+    match = _ROUND.fullmatch(folder.name)
+    stem, number = (match[1], int(match[2])) if match else (folder.name, 1)
+    name = f"{stem}_round{number + 1}"
+    return folder.path.resolve().parent / name, name
+
+
+def list_round_files(folder: CampaignFolder, output: Path) -> list[Path]:
+    """List the files that `join_measurements` writes."""
+    names = [DOCUMENT, CSV]
+    if not _is_named_robot(folder):
+        names.append(_ROBOT)
+    return [output / name for name in names]
+
+
+def _is_named_robot(folder: CampaignFolder) -> bool:
+    """Whether the robot of a campaign is one of the project's."""
+    return folder.robot_file.parent == folder.robots_folder
+
+
+def join_measurements(
+    folder: CampaignFolder,
+    targets: CorrectedTargets,
+    measured: TargetMeasurements,
+    output: Path,
+    name: str,
+) -> list[str]:
+    """Write a campaign that has the measurements of a campaign and, as a further session,
+    those of its corrected robot.
+
+    In a campaign in the tracker's frame each session has a frame of its own.
+
+    Parameters
+    ----------
+    folder : the campaign, which stays as it is.
+    targets, measured : as `read_verification` returns them.
+    output : folder of the new campaign.
+    name : its name.
+
+    Returns
+    -------
+    Remarks on columns that were left out.
+    """
+    _, campaign = read_described_campaign(folder)
+    if campaign.measured == "pose" and measured.rotation_vector is None:
+        allowed = "rx, ry, rz or another orientation: this campaign measures poses"
+        raise InputError(folder.source, "measured", "no measured orientations", allowed)
+    before = campaign.measurements
+    columns = _read_columns(folder)
+    session = int(before.session.max()) + 1
+    further = _tabulate_session(campaign, targets, measured, session)
+    remarks = []
+    for condition in _CONDITIONS:
+        if condition in columns and condition not in further:
+            remarks.append(
+                f"{condition} is left out: the new measurements do not have it"
+            )
+            del columns[condition]
+    table = {
+        column: np.concatenate([values, further[column]])
+        for column, values in columns.items()
+    }
+    document = dict(folder.document) | {"campaign": name}
+    document["holdout"] = _number_held_out_poses(folder.holdout, before)
+    if not _is_named_robot(folder):
+        document["robot"] = _ROBOT
+        # The robot file comes first, because a folder with a campaign.yaml needs it.
+        with write_together(output, [_ROBOT]) as partial:
+            write_text(partial / _ROBOT, read_text(folder.robot_file, LARGEST_BYTES))
+    write_campaign(output, document, table, campaign.robot.joints, kind="csv")
+    return remarks
+
+
+def _read_columns(folder: CampaignFolder) -> dict[str, np.ndarray]:
+    """Read the columns of a campaign's measurements as they are in its file."""
+    joints = folder.robot.joints
+    measured = folder.document["measured"]
+    cells = read_measurements(folder.path, joints, measured)
+    unread = ROTATION if measured == "position" else ()
+    columns: dict[str, np.ndarray] = {}
+    for name, column in describe_columns(joints).items():
+        if name not in cells.columns or name in unread:
+            continue
+        if column.type == "string":
+            columns[name] = np.array(cells.texts(name))
+        elif column.type == "int32":
+            columns[name] = cells.integers(name)
+        else:
+            columns[name] = cells.numbers(name)
+    count = len(cells.rows)
+    columns.setdefault("session", np.zeros(count, int))
+    for name in WRENCH_NAMES:
+        columns.setdefault(name, np.zeros(count))
+    return columns
+
+
+def _tabulate_session(
+    campaign: Campaign,
+    targets: CorrectedTargets,
+    measured: TargetMeasurements,
+    session: int,
+) -> dict[str, np.ndarray]:
+    """Tabulate measurements at corrected targets as a session of a campaign."""
+    count = len(measured)
+    row = measured.row
+    wrench = targets.wrench[row]
+    columns: dict[str, np.ndarray] = {
+        "session": np.full(count, session),
+        "pose": row + 1,
+        "load": wrench.any(axis=1).astype(int),
+        "repeat": measured.repeat,
+        "target": measured.target,
+    }
+    for joint, angles in enumerate(targets.joint_angles[row].T, 1):
+        columns[f"q{joint}"] = angles
+        # The direction of approach is unknown.
+        columns[f"approach{joint}"] = np.zeros(count)
+    columns |= dict(zip(WRENCH_NAMES, wrench.T, strict=True))
+    columns |= dict(zip("xyz", measured.position.T, strict=True))
+    if campaign.measured == "pose" and measured.rotation_vector is not None:
+        vectors = measured.rotation_vector
+        columns |= dict(zip(ROTATION, vectors.T, strict=True))
+    return columns | measured.conditions
+
+
+def _number_held_out_poses(
+    holdout: dict[str, Any], before: Measurements
+) -> dict[str, Any]:
+    """Return the rule of the held-out poses for a campaign with one more session: poses
+    that it names get their session."""
+    if "poses" not in holdout:
+        return holdout
+    session = int(before.session.min())
+    return {
+        "poses": [
+            pose if isinstance(pose, list) else [session, pose]
+            for pose in holdout["poses"]
+        ]
+    }
