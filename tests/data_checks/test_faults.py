@@ -214,7 +214,7 @@ def test_loads_turned_round_are_seen_by_compliances_below_zero_and_joints_withou
 ):
     (warning,) = warned(fanuc, turned=-1.0, is_known=False)
     assert (
-        all(f"joint {joint} -" in warning for joint in range(1, 7))
+        all(f"joint {joint} below 0 " in warning for joint in range(1, 7))
         and "usual for such a robot" in warning
     )
     rigid = replace(

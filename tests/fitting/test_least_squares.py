@@ -33,15 +33,17 @@ from synthetic import (
 )
 
 from elastocal.campaigns.campaign import Target
+from elastocal.effects.elastic import joint_compliance
 from elastocal.fitting import least_squares
 from elastocal.fitting.least_squares import (
     CONVERGENCE_TOLERANCE,
+    compute_negative_compliances,
     fit_model,
     fit_placement,
     get_plausible_sizes,
     register_placement,
 )
-from elastocal.fitting.model import Model
+from elastocal.fitting.model import Model, get_joint_compliances
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.normal_equations import LeastSquaresProblem
 from elastocal.fitting.observations import Observations
@@ -587,9 +589,9 @@ def assert_blocks_are_whole_poses(cluster, blocks, poses):
 
 
 def assert_close_to_largest(values, expected):
-    """Check that two arrays agree to 1e-5 of the largest expected value."""
+    """Check that two arrays agree to 5e-5 of the largest expected value."""
     np.testing.assert_allclose(
-        values, expected, rtol=0, atol=1e-5 * np.abs(expected).max()
+        values, expected, rtol=0, atol=5e-5 * np.abs(expected).max()
     )
 
 
@@ -610,7 +612,8 @@ def test_a_fit_of_more_states_than_fit_in_memory_is_the_same_and_keeps_no_jacobi
     deviation = np.sqrt(np.diag(in_memory.covariance))
     coefficients = np.concatenate(in_memory.estimate.coefficients)
     change = np.abs(coefficients - np.concatenate(blockwise.estimate.coefficients))
-    assert (change < 5e-3 * deviation[-len(coefficients) :]).all()
+    # The shape of the stiffening comes last.
+    assert (change < 5e-3 * deviation[-len(coefficients) - 1 : -1]).all()
     np.testing.assert_allclose(
         np.sqrt(np.diag(blockwise.covariance)), deviation, rtol=1e-4
     )
@@ -666,3 +669,19 @@ def test_a_declared_offset_is_estimated_with_its_prior(kuka, offset_std_m):
     np.testing.assert_allclose(
         np.diag(fitted.covariance), share * data_variance, rtol=1e-4
     )
+
+
+def test_springs_stay_at_zero_where_loads_of_the_wrong_sign_would_make_them_negative(
+    fanuc,
+):
+    """The other parameters are those of a fit without these springs."""
+    model = build_model(fanuc, "joint_offset@3", targets=TARGETS)
+    model = model.with_effects([joint_compliance(model.sites)])
+    truth = make_estimate(model, seed=2)
+    observations = observe_exactly(model, truth, make_states(6, 40, seed=2))
+    states = observations.states
+    turned = replace(observations, states=replace(states, wrench=-states.wrench))
+    fitted = fit_model(model, turned, NOISE)
+    compliance = get_joint_compliances(model, fitted.estimate)
+    assert fitted.converged and (compliance >= 0).all()
+    assert (compute_negative_compliances(fitted) > 3).sum() >= 3

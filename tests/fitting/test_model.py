@@ -19,6 +19,7 @@ from synthetic import (
 
 from elastocal.campaigns.campaign import Campaign, Target, tabulate_measurements
 from elastocal.effects.catalogue import candidates_on
+from elastocal.effects.protocol import Parameter
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import (
     apply_step,
@@ -262,7 +263,7 @@ def find_parameter(model, estimate, key, name):
     return names.index((key, name))
 
 
-def test_only_shape_parameters_have_bounds_and_each_has_those_of_its_own_effect(fanuc):
+def test_shapes_have_ranges_and_other_parameters_the_signs_of_physics(fanuc):
     """Two of the three effects have a shape parameter of the same name."""
     model = build_model(fanuc, "lost_motion@2", "link_geometry@3", "stiffening@4")
     estimate = make_estimate(model, seed=7)
@@ -271,11 +272,27 @@ def test_only_shape_parameters_have_bounds_and_each_has_those_of_its_own_effect(
     for effect in (model.effects[0], model.effects[2]):
         index = find_parameter(model, estimate, effect.key, "torque")
         expected[index] = effect.shapes[0].lowest, effect.shapes[0].highest
+    is_nonlinear = np.isfinite(expected[:, 0])
+    owners = [owner for owner, _ in list_parameters(model, estimate)]
+    # A play is positive; stiffening takes away from a compliance.
+    expected[owners.index("lost_motion@2"), 0] = 0.0
+    expected[owners.index("stiffening@4"), 1] = 0.0
     np.testing.assert_array_equal(bounds, expected)
     np.testing.assert_array_equal(
-        find_nonlinear_parameters(model, estimate), np.isfinite(expected[:, 0])
+        find_nonlinear_parameters(model, estimate), is_nonlinear
     )
-    assert np.isfinite(expected).sum() == 4
+    assert is_nonlinear.sum() == 2
+
+
+@pytest.mark.parametrize(
+    ("sign", "lowest", "bounds"),
+    [(1, -3.0, (0.0, np.inf)), (-1, -3.0, (-3.0, 0.0)), (0, -3.0, (-3.0, np.inf))],
+)
+def test_the_bounds_of_a_parameter_are_its_sign_and_its_lowest_value(
+    sign, lowest, bounds
+):
+    parameter = Parameter("p", "kg", 1.0, sign=sign, lowest=lowest)
+    assert parameter.bounds == bounds
 
 
 def solve_equilibrium(chain, compliance, states):

@@ -374,7 +374,7 @@ def test_the_prior_of_the_declared_geometry_has_the_scale_of_the_largest_evidenc
     offset, scale, kuka
 ):
     campaign, model = plant_joint_offsets(kuka, offset)
-    # Joint compliances have no plausible scale, so they have no prior.
+    # The prior of joint compliances is their own.
     assert find_declared_geometry(model) == {"joint_offset"}
     wide = fit_with_wide_prior(campaign, model)
     assert maximize_evidence(wide)[0] == pytest.approx(scale, rel=0.01)
@@ -383,7 +383,7 @@ def test_the_prior_of_the_declared_geometry_has_the_scale_of_the_largest_evidenc
     assert [priors[f"joint_offset@{joint}"] for joint in JOINTS] == pytest.approx(
         [scale * 1e-3] * 4, rel=0.01
     )
-    assert priors["joint_compliance"] is None
+    assert priors["joint_compliance"] == model.effects[0].parameters[-1].prior_std
 
 
 @pytest.mark.parametrize("share", [1.0, 0.1, 0.01])

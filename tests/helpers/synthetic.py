@@ -109,9 +109,12 @@ def draw_target_rotation(model, target, rng):
 
 
 def draw_coefficients(effect, rng, size):
-    """Draw the coefficients of an effect, up to `size` times their plausible sizes."""
+    """Draw the coefficients of an effect, up to `size` times their plausible sizes and
+    with the signs that physics gives."""
     plausible = np.array([parameter.plausible for parameter in effect.parameters])
-    return size * plausible * rng.uniform(-1, 1, len(plausible))
+    drawn = size * plausible * rng.uniform(-1, 1, len(plausible))
+    signs = np.array([parameter.sign for parameter in effect.parameters])
+    return np.where(signs != 0, signs * np.abs(drawn), drawn)
 
 
 def make_estimate(model, sessions=(0,), seed=0, size=0.3):

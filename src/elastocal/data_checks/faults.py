@@ -26,6 +26,7 @@ from elastocal.data_checks.placement import (
     select_spread_poses,
 )
 from elastocal.data_checks.protocol import Fault, Value
+from elastocal.fitting.least_squares import compute_negative_compliances
 from elastocal.fitting.model import get_joint_compliances
 from elastocal.fitting.observations import index_poses
 from elastocal.mechanics.elastostatics import (
@@ -56,6 +57,10 @@ _MAX_ROTATION_RAD = 5 * IMPLAUSIBLE_RAD
 # itself known to a factor of five.
 _MAX_NOMINAL_RATIO = 5.0
 _MAX_USUAL_RATIO = 25.0
+# Share of its prior variance above which a compliance counts as not identified, and
+# standard errors by which one is far off.
+_IDENTIFIED_SHARE = 0.5
+_NEGATIVE_STD_ERRORS = 2.0
 _RIGID = (
     "the robot file states no joint compliances: the joints are taken as rigid, and do"
     " not yield to the weights that it may state; load the robot and set compliance to"
@@ -408,17 +413,22 @@ def warn_of_compliances(fitted: Fit) -> list[str]:
     std_error = np.sqrt(np.diag(fitted.covariance))[indices]
     compliance = get_joint_compliances(model, fitted.estimate)
     nominal = model.nominal_compliance
+    # The prior says more of an unidentified compliance than the measurements do, so
+    # such a number is no reason for a warning.
+    is_identified = std_error**2 < _IDENTIFIED_SHARE * fitted.prior_std[indices] ** 2
+    is_negative = compute_negative_compliances(fitted) > _NEGATIVE_STD_ERRORS
     ratio = _MAX_USUAL_RATIO
     reference = "usual for such a robot"
     if model.compliance_known:
         ratio = _MAX_NOMINAL_RATIO
         reference = "nominal"
     is_far = (compliance < nominal / ratio) | (compliance > ratio * nominal)
-    # A compliance without a standard error was not identified.
+    is_far &= np.abs(compliance - nominal) > _NEGATIVE_STD_ERRORS * std_error
     joints = [
-        f"joint {joint + 1} {1e6 * compliance[joint]:.3g} ± {1e6 * std_error[joint]:.2g} "
+        f"joint {joint + 1} {'below ' if is_negative[joint] else ''}"
+        f"{1e6 * compliance[joint]:.3g} ± {1e6 * std_error[joint]:.2g} "
         f"({reference} {1e6 * nominal[joint]:.3g})"
-        for joint in np.flatnonzero((std_error > 0) & is_far)
+        for joint in np.flatnonzero(is_identified & (is_far | is_negative))
     ]
     if not joints:
         return []

@@ -16,7 +16,7 @@ from elastocal.diagnosis.verdict import (
     compute_location_probabilities,
 )
 from elastocal.effects.catalogue import list_effects
-from elastocal.effects.protocol import Shape
+from elastocal.effects.protocol import Parameter, Shape
 from elastocal.effects.sizes import lever_m
 from elastocal.fitting.linearization import compute_effect_sensitivities
 from elastocal.verdict import DataFault, Effect, EffectParameter, FaultValue
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from elastocal.diagnosis.model_averaging import ModelAverage
     from elastocal.diagnosis.verdict import Evidence
-    from elastocal.effects.protocol import Candidate, Parameter
+    from elastocal.effects.protocol import Candidate
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.observations import Observations
 
@@ -35,6 +35,9 @@ if TYPE_CHECKING:
 # reach, plus this many standard errors.
 _IMPLAUSIBLE_FACTOR = 3.0
 _STD_ERRORS = 2.0
+# Share of its prior variance above which a parameter counts as not identified, so that
+# its value says nothing.
+_IDENTIFIED_SHARE = 0.5
 # Units of masses and of first moments, and of their products with a compliance.
 _PRODUCT_UNITS = {"kg": "rad kg/(N m)", "kg m": "rad kg m/(N m)"}
 
@@ -150,9 +153,13 @@ def state_parameters(
         is_held = bool(fitted.unidentifiable[index])
         is_shape = isinstance(unknown, Shape)
         std_error = float(np.sqrt(fitted.covariance[index, index]))
+        averaged = float(value) + average.shift.get(key, 0.0)
+        if isinstance(unknown, Parameter):
+            # Averages are of normal approximations, which know no sign.
+            averaged = float(np.clip(averaged, *unknown.bounds))
         parameter = EffectParameter(
             name=f"{member.key} {unknown.name}",
-            value=float(value) + average.shift.get(key, 0.0),
+            value=averaged,
             std_error=average.std_error.get(key, std_error),
             unit=unknown.unit,
             prior_std=getattr(unknown, "prior_std", None),
@@ -296,13 +303,20 @@ def find_oversized_effects(fitted: Fit, names: Collection[str]) -> set[str]:
 def _generate_estimates(
     fitted: Fit, effect: Candidate
 ) -> Iterator[tuple[float, float, Parameter]]:
-    """Yield value, standard error and definition of each linear parameter."""
+    """Yield value, standard error and definition of each linear parameter that the
+    measurements identify; the value is the one that the measurements alone would give,
+    beyond the bounds of physics too."""
     indices = fitted.parameter_indices(effect.key)
     std_errors = np.sqrt(np.diag(fitted.covariance)[indices])
+    values = fitted.effect_values(effect.key)[0].copy()
     # Shapes come last and are not among the parameters.
-    yield from zip(
-        fitted.effect_values(effect.key)[0], std_errors, effect.parameters, strict=False
-    )
+    if fitted.beyond_bound is not None:
+        values += fitted.beyond_bound[indices[: len(values)]]
+    for estimate in zip(values, std_errors, effect.parameters, strict=False):
+        _, std_error, parameter = estimate
+        prior_std = np.inf if parameter.prior_std is None else parameter.prior_std
+        if 0.0 < std_error**2 < _IDENTIFIED_SHARE * prior_std**2:
+            yield estimate
 
 
 def _is_oversized(value: float, std_error: float, parameter: Parameter) -> bool:

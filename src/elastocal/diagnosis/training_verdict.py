@@ -301,6 +301,8 @@ def _state_compliances(
         parameters = [final.parameters[index][1] for index in indices]
         keys = [("joint_compliance", parameter.name) for parameter in parameters]
         after += [average.shift.get(key, 0.0) for key in keys]
+        # Averages are of normal approximations; no spring is negative.
+        after = np.maximum(after, 0.0)
         fit_errors = np.sqrt(np.diag(final.covariance))[indices]
         std_error = np.array(
             [
@@ -308,11 +310,10 @@ def _state_compliances(
                 for key, fit_error in zip(keys, fit_errors, strict=True)
             ]
         )
-        # The prior is taken to be as wide as the largest plausible compliance.
-        plausible = np.array([parameter.plausible for parameter in parameters])
         identifiable = ~final.unidentifiable[indices] & (
-            std_error**2 < prior_share * (std_error**2 + plausible**2)
+            std_error**2 < prior_share * final.prior_std[indices] ** 2
         )
+        std_error = np.where(identifiable, std_error, 0.0)
     before = get_joint_compliances(declared.model, declared.estimate)
     return Compliances(
         before=tuple((1e6 * before).tolist()),

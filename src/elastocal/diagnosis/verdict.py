@@ -25,8 +25,8 @@ from scipy.special import chdtrc, fdtrc
 
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.model_averaging import compute_extra_squares
-from elastocal.fitting.model import get_joint_compliances
 from elastocal.fitting.noise import count_effective_parameters
+from elastocal.fitting.least_squares import compute_negative_compliances
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -443,15 +443,12 @@ def find_contradictions(final: Fit, measured: Noise, settings: Settings) -> list
     contradictions += warn_of_pose_error(final.noise, settings.largest_pose_error_rad)
     if not final.model.identifies_compliance:
         return contradictions
-    compliance = get_joint_compliances(final.model, final.estimate)
-    indices = final.parameter_indices("joint_compliance")
-    std_error = np.sqrt(np.diag(final.covariance))[indices]
-    negative = compliance < -settings.negative_compliance * std_error
-    for joint in np.flatnonzero(negative):
-        multiple = -compliance[joint] / std_error[joint]
+    multiples = compute_negative_compliances(final)
+    for joint in np.flatnonzero(multiples > settings.negative_compliance):
+        multiple = multiples[joint]
         contradictions.append(
-            f"the compliance of joint {joint + 1} is negative by {multiple:.1f} "
-            "standard errors"
+            f"the compliance of joint {joint + 1} would be negative by "
+            f"{multiple:.1f} standard errors"
         )
     return contradictions
 

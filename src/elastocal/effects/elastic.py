@@ -39,6 +39,9 @@ _TAPER = Shape("taper", "1", 0.3, 0.0, 0.6, tried=1)
 # Upper bound on compliances, as a multiple of those that suit the size of an arm. Published
 # compliances reach five times these.
 _OVER_USUAL = 10.0
+# Scale of the half-normal prior of a compliance, in upper bounds: one compliance in twenty
+# exceeds its bound.
+_PRIOR_OF_BOUND = 1.0 / 1.96
 # Gauss-Legendre quadrature along a link.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
@@ -47,13 +50,17 @@ def joint_compliance(sites: Sites) -> Candidate:
     """Make one candidate of the compliances of all joints, each a torsional spring:
     theta_i = c_i tau_i (equation 7).
 
+    Springs yield to their load, so no compliance is negative: each has a half-normal
+    prior, wide against what robots have. Measurements that hardly show a joint's
+    compliance leave it rigid rather than at a guess or at a value of either sign.
+
     It is not an effect of the catalogue. The declared model contains it if the compliances
     are to be identified.
     """
     units = ["m/N" if prismatic else "rad/(N m)" for prismatic in sites.prismatic]
     sizes = [_OVER_USUAL * compliance for compliance in sites.compliance]
     parameters = tuple(
-        Parameter(f"c{j}", unit, size)
+        Parameter(f"c{j}", unit, size, _PRIOR_OF_BOUND * size, sign=1)
         for j, (unit, size) in enumerate(zip(units, sizes, strict=True), 1)
     )
     law = _make_spring_law([joint] for joint in range(sites.joints))

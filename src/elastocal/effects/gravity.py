@@ -87,7 +87,13 @@ def declared_weight(sites: Sites) -> Candidate:
         along = error * max(float(np.linalg.norm(mass.centre_m)), _LEAST_LEVER_M)
         moment_std = float(np.hypot(along, across))
         parameters.append(
-            Parameter(f"mass_error_of_link_{mass.link}", "kg", error, error)
+            Parameter(
+                f"mass_error_of_link_{mass.link}",
+                "kg",
+                error,
+                error,
+                lowest=-mass.mass_kg,
+            )
         )
         parameters += [
             Parameter(

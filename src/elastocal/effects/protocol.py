@@ -79,6 +79,8 @@ class Parameter:
     order : order of a harmonic, with which its plausible size falls; 1 elsewhere.
     sized : whether the prior was estimated from the measurements.
     most : multiple of the plausible size that a search allows for.
+    lowest : lowest value that physics allows beside the sign, such as minus the declared
+        mass for the error of a mass.
     """
 
     name: str
@@ -89,6 +91,13 @@ class Parameter:
     order: int = 1
     sized: bool = False
     most: float = np.inf
+    lowest: float = -np.inf
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Lowest and highest value that physics allows."""
+        lowest = max(self.lowest, 0.0) if self.sign > 0 else self.lowest
+        return lowest, 0.0 if self.sign < 0 else np.inf
 
 
 @dataclass(frozen=True)

@@ -114,6 +114,9 @@ class Fit:
         Of the fitted states; None if there are too many to keep them in memory.
     converged : bool
         Whether the last step was within the tolerance in every parameter.
+    beyond_bound : (P,) array or None
+        How far the measurements would move each parameter beyond the bound of physics
+        at which it stays; None if no bound binds.
 
     References
     ----------
@@ -131,6 +134,7 @@ class Fit:
     joint_jacobian: np.ndarray | None
     conditions: Conditions | None
     converged: bool = True
+    beyond_bound: np.ndarray | None = None
 
     @property
     def parameters(self) -> list[tuple[str, Parameter]]:
@@ -363,6 +367,7 @@ def fit_robustly(
         final.joint_jacobian,
         final.conditions,
         converged,
+        step.solution.beyond_bound,
     )
 
 
@@ -421,24 +426,43 @@ class ParameterTraits:
     ) -> NormalSolution:
         """Solve the normal equations within the bounds of the parameters.
 
-        A shape that would leave its range moves to the nearer bound, and the other
-        parameters move as they must given that.
+        Parameters that would leave their ranges stay at the nearer bounds (active set
+        [1]_), and the others move as they must given that. A step starts from an empty
+        set, so that bounds which no longer bind are released.
+
+        References
+        ----------
+        .. [1] Björck, Numerical Methods for Least Squares Problems, 5.2, SIAM, 1996.
         """
         solution = solve_normal_equations(gram, gradient, self.scales, present, frozen)
         target = present + solution.step
-        out_of_range = (target < self.bounds[:, 0]) | (target > self.bounds[:, 1])
-        if not out_of_range.any():
+        beyond_bound = target - np.clip(target, *self.bounds.T)
+        beyond_bound[frozen] = 0.0
+        if not beyond_bound.any():
             return solution
-        step_to_bound = (
-            np.clip(target, *self.bounds.T)[out_of_range] - present[out_of_range]
-        )
-        scaled = step_to_bound / self.scales.plausible[out_of_range]
-        reduced_gradient = gradient - gram[:, out_of_range] @ scaled
-        step = solve_normal_equations(
-            gram, reduced_gradient, self.scales, present, frozen | out_of_range
-        ).step
-        step[out_of_range] = step_to_bound
-        return replace(solution, step=step)
+        active = np.zeros(len(target), bool)
+        fixed = frozen | solution.unidentifiable
+        step = solution.step
+        # Each round adds a parameter to the set, so there are no more rounds than these.
+        while (out := self.find_out_of_range(present + step, active | fixed)).any():
+            active |= out
+            step_to_bound = np.clip(present + step, *self.bounds.T)[active]
+            step_to_bound -= present[active]
+            scaled = step_to_bound / self.scales.plausible[active]
+            step = solve_normal_equations(
+                gram,
+                gradient - gram[:, active] @ scaled,
+                self.scales,
+                present,
+                fixed | active,
+            ).step
+            step[active] = step_to_bound
+        return replace(solution, step=step, beyond_bound=beyond_bound)
+
+    def find_out_of_range(self, values: np.ndarray, fixed: np.ndarray) -> np.ndarray:
+        """Find the values (P,) out of their ranges, without those of fixed parameters."""
+        lowest, highest = self.bounds.T
+        return ~fixed & ((values < lowest) | (values > highest))
 
 
 @dataclass(frozen=True)
@@ -553,6 +577,11 @@ class GaussNewtonStep:
             solution = replace(
                 reused.solution, step=reused.solution.covariance @ gradient_with_prior
             )
+            leaves = traits.find_out_of_range(
+                present + solution.step, reused.solution.unidentifiable
+            )
+            if leaves.any():
+                solution = traits.solve(gram, gradient, present, traits.frozen)
         return cls(traits, iterate, huber.scale, gram, gradient, present, solution)
 
     @property
@@ -585,6 +614,8 @@ class GaussNewtonStep:
     def is_short(self) -> bool:
         """Whether the Gram matrix is still valid after the step: see
         `_REUSE_THRESHOLD`."""
+        if self.solution.beyond_bound is not None:
+            return False
         moving_shapes = self.traits.scales.nonlinear & ~self.solution.unidentifiable
         limit = np.where(moving_shapes, 0.0, self._standard_errors(_REUSE_THRESHOLD))
         return bool((np.abs(self.step) <= limit).all())
@@ -704,6 +735,24 @@ class ArmijoLineSearch:
         present = get_parameter_values(self.problem.model, estimate)
         frozen = self.traits.frozen | self._curving()
         return self.traits.solve(gram, gradient, present, frozen).step
+
+
+def compute_negative_compliances(fitted: Fit) -> np.ndarray:
+    """Compute by how many standard errors each joint compliance would be negative if
+    physics did not keep it at zero, (n,) array; zero for compliances above zero.
+
+    A compliance whose prior says more than the measurements is never negative.
+    """
+    indices = fitted.parameter_indices("joint_compliance")
+    if fitted.beyond_bound is None:
+        return np.zeros(len(indices))
+    std_error = np.sqrt(np.diag(fitted.covariance))[indices]
+    identified = std_error**2 < 0.5 * fitted.prior_std[indices] ** 2
+    return np.where(
+        identified,
+        -fitted.beyond_bound[indices] / np.maximum(std_error, np.finfo(float).tiny),
+        0.0,
+    )
 
 
 def get_plausible_sizes(model: Model, estimate: Estimate) -> np.ndarray:

@@ -269,16 +269,15 @@ def find_placement_parameters(owners: Iterable[str]) -> np.ndarray:
 def get_parameter_bounds(model: Model, estimate: Estimate) -> np.ndarray:
     """Lowest and highest value of each parameter, (P, 2) array.
 
-    Shapes have ranges; all other parameters are unbounded.
+    Shapes have ranges, other parameters the signs of physics.
     """
     ranges = {
         (effect.key, shape.name): (shape.lowest, shape.highest)
         for effect in model.effects
         for shape in effect.shapes
     }
-    unbounded = (-np.inf, np.inf)
     bounds = [
-        ranges.get((owner, parameter.name), unbounded)
+        ranges.get((owner, parameter.name), parameter.bounds)
         for owner, parameter in list_parameters(model, estimate)
     ]
     return np.array(bounds).reshape(-1, 2)

@@ -73,11 +73,15 @@ class NormalSolution:
     step : (P,) array, zero for parameters that do not move
     covariance : (P, P) array, zero for parameters that do not move
     unidentifiable : (P,) bool array, parameters that do not move
+    beyond_bound : (P,) array, optional
+        How far the measurements would move each parameter beyond its bound, with the
+        sign of that move; zero for all parameters if None.
     """
 
     step: np.ndarray
     covariance: np.ndarray
     unidentifiable: np.ndarray
+    beyond_bound: np.ndarray | None = None
 
 
 def solve_normal_equations(

@@ -28,8 +28,8 @@ from elastocal.diagnosis.gross_errors import (
 )
 from elastocal.diagnosis.misplaced import find_misplaced_frames
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.least_squares import fit_model
-from elastocal.fitting.model import build_case, get_joint_compliances
+from elastocal.fitting.least_squares import compute_negative_compliances, fit_model
+from elastocal.fitting.model import build_case
 from elastocal.fitting.noise import count_effective_parameters
 from elastocal.loop.loading import load_campaign
 from elastocal.validation.transfer import warn_of_repeated_poses
@@ -237,14 +237,7 @@ def _find_negative_compliances(declared: Fit) -> list[str]:
     the declared model lacks."""
     if not declared.model.identifies_compliance:
         return []
-    indices = declared.parameter_indices("joint_compliance")
-    std_error = np.where(
-        declared.unidentifiable[indices],
-        np.inf,
-        np.sqrt(np.diag(declared.covariance))[indices],
-    )
-    compliance = get_joint_compliances(declared.model, declared.estimate)
-    negative = compliance < -_NEGATIVE_STD_ERRORS * std_error
+    negative = compute_negative_compliances(declared) > _NEGATIVE_STD_ERRORS
     return [str(joint + 1) for joint in np.flatnonzero(negative)]
 
 

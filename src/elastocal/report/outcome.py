@@ -55,10 +55,14 @@ def _describe_campaign(name: str, verdict: Verdict) -> list[str]:
 
     stated = render_campaign_sentences(verdict)
     mark = "✓" if _is_correctable(verdict) else "!"
+    not_converged = [
+        f"! {warning}" for warning in verdict.warnings if "did not converge" in warning
+    ]
     return [
         f"{mark} {name}: {stated['sentences'][0]}",
         *(f"  {line}" for line in stated["headline_line"]),
         *(f"  {line}" for line in stated["left_out"]),
+        *not_converged,
     ]
 
 
