@@ -31,7 +31,7 @@ from elastocal_proof.plant.campaigns import (
     draw_schedule,
     simulate_measurements,
 )
-from elastocal_proof.plant.simulated_robot import draw_specimen
+from elastocal_proof.plant.simulated_robot import SimulatedRobot, draw_specimen
 
 ROBOTS = ROOT / "config" / "robots"
 ARMS = ("kuka", "gp180", "iiwa14", "panda")
@@ -56,12 +56,31 @@ def declare_masses(robot_file: Path) -> dict[str, Any]:
     return document
 
 
+def write_simulated_campaign(
+    folder: Path, robot: SimulatedRobot, design: Design, seed: int
+) -> None:
+    """Write the campaign of a simulated robot, without the file of the robot."""
+    arm = robot.arm
+    table = simulate_measurements(robot, design, draw_schedule(arm, design, seed))
+    point = arm.points[-1]
+    document = {
+        "campaign": folder.name,
+        "robot": "robot.yaml",
+        "measured": design.measured,
+        "frame": "base",
+        "targets": {point: {"point": point, "offset_m": [0, 0, 0]}},
+        "compliance": "identify",
+        "declared": [],
+        "holdout": {"poses": list(range(design.poses - design.held_out, design.poses))},
+    }
+    write_campaign(folder, document, table, arm.joints, "csv")
+
+
 def measure(folder: Path, name: str, seed: int) -> None:
     """Write the campaign of a simulated robot that is hardly loaded."""
     draws = np.random.default_rng([seed, 63])
     robot_file = ROBOTS / f"{name}.yaml"
     arm = read_arm(robot_file)
-    robot = draw_specimen(arm, seed)
     design = Design(
         poses=int(draws.integers(22, 34)),
         held_out=8,
@@ -73,19 +92,7 @@ def measure(folder: Path, name: str, seed: int) -> None:
         covariates=(),
         measured="position",
     )
-    schedule = draw_schedule(arm, design, seed)
-    table = simulate_measurements(robot, design, schedule)
-    document = {
-        "campaign": f"{name}_{seed}",
-        "robot": "robot.yaml",
-        "measured": "position",
-        "frame": "base",
-        "targets": {arm.points[-1]: {"point": arm.points[-1], "offset_m": [0, 0, 0]}},
-        "compliance": "identify",
-        "declared": [],
-        "holdout": {"poses": list(range(design.poses - design.held_out, design.poses))},
-    }
-    write_campaign(folder, document, table, arm.joints, "csv")
+    write_simulated_campaign(folder, draw_specimen(arm, seed), design, seed)
     (folder / "robot.yaml").write_text(
         yaml.safe_dump(declare_masses(robot_file)), encoding="utf-8"
     )

@@ -144,7 +144,10 @@ def link_weight(entry: Effect, sites: Sites) -> Candidates:
     m)), m_k a mass at the far end of link k (kg) and tau_ik its torque on joint i (N
     m/kg). Given the compliances, the sag of the arm is linear in masses and first moments
     (Atkeson et al. 1986). The sag of one joint alone is linear in their products with its
-    compliance. A link's own mass m at its middle counts as m/2 at either end. If the robot
+    compliance. A link's own mass m at its middle counts as m/2 at either end.
+    Masses at the ends and first moments of all bodies span the base parameters of gravity
+    (Gautier 1991); those that the measurements do not separate share their prior. A body
+    between joints that coincide has no length, hence first moments along all axes. If the robot
     file declares masses, their errors are parameters already (`declared_weight`). Variants
     also have first moments across the lines of links (kg m).
     """
@@ -157,17 +160,33 @@ def link_weight(entry: Effect, sites: Sites) -> Candidates:
     for joint, links in near.items():
         yield _sag_of_joint(entry, sites, joint, links)
     for joint, links in near.items():
-        axes = _moment_axes(sites, links, [joint])
+        bodies = _list_bodies(sites, joint, links)
+        axes = _moment_axes(sites, bodies, [joint])
         if axes:
             yield _sag_of_joint(entry, sites, joint, links, axes, _OFF_THE_LINE)
+
+
+def _list_bodies(sites: Sites, joint: int, links: Sequence[int]) -> list[int]:
+    """List links behind a joint, from 0, and the bodies without length between them."""
+    return [
+        body
+        for body in range(joint + 1, links[-1] + 1)
+        if body in links or not sites.has_length(body)
+    ]
 
 
 def _moment_axes(
     sites: Sites, links: Sequence[int], joints: Iterable[int]
 ) -> list[tuple[int, int]]:
     """List each link with each axis across its line along which a first moment loads one
-    of the joints."""
-    axes = [(link, axis) for link in links for axis in sites.transverse_axes(link)]
+    of the joints; a link without length has no line, so that all its axes count."""
+    axes = [
+        (link, axis)
+        for link in links
+        for axis in (
+            sites.transverse_axes(link) if sites.has_length(link) else range(3)
+        )
+    ]
     loading = {
         (link, axis)
         for joint in joints
@@ -182,14 +201,16 @@ def _sag_of_arm(entry: Effect, sites: Sites, first: int) -> Candidates:
     joint that weight can rotate."""
     carried = sites.carried_links(first)
     near = carried[:_LINKS]
-    axes = _moment_axes(sites, near, range(sites.joints))
+    near_bodies = _list_bodies(sites, first, near)
+    axes = _moment_axes(sites, near_bodies, range(sites.joints))
     variants: list[tuple[Sequence[int], Sequence[tuple[int, int]], str]] = [
         (near, (), "")
     ]
     if axes:
         variants.append((near, axes, _OFF_THE_LINE))
     if len(carried) > _LINKS:
-        all_axes = _moment_axes(sites, carried, range(sites.joints))
+        bodies = _list_bodies(sites, first, [*carried, sites.joints])
+        all_axes = _moment_axes(sites, bodies, range(sites.joints))
         variants.append((carried, all_axes, "all links"))
     size = entry.size("mass", sites)
     for links, moment_axes, detail in variants:
@@ -310,7 +331,7 @@ def declared_masses(entry: Effect, sites: Sites) -> Candidates:
 # The payload stays on the flange in tasks, so that it moves the robot.
 @_gravity(
     "weight of an undeclared payload",
-    Size("mass", 0.15, "a cable package or a forgotten gripper", RATED),
+    Size("mass", 0.15, "a cable package or a forgotten gripper", RATED, 1),
     formula=(
         r"\theta = \mathrm{diag}(c)\, J^{T} \begin{pmatrix} m g \\ m r \times g "
         r"\end{pmatrix}"
@@ -336,7 +357,10 @@ def payload(entry: Effect, sites: Sites) -> Candidates:
     # A payload can only be distinguished from the weight of the links if that weight or a
     # load is known.
     tool = entry.candidate(
-        (), [Parameter("mass", "kg", mass), *moments], law, LOADED_JOINTS - {"load"}
+        (),
+        [Parameter("mass", "kg", mass, sign=1), *moments],
+        law,
+        LOADED_JOINTS - {"load"},
     )
     yield tool
     # The mass alone causes most of the displacement.

@@ -142,8 +142,12 @@ class Sites:
         """Find the links that have a length and whose weight can turn a joint, given by
         its index."""
         can_turn = self._unit_load_torques[:, 0, joint] > _SHORTEST_M
-        has_length = np.linalg.norm(self.link_vectors_m, axis=1) > _SHORTEST_M
+        has_length = [self.has_length(link) for link in range(self.joints + 1)]
         return np.flatnonzero(can_turn & has_length).tolist()
+
+    def has_length(self, link: int) -> bool:
+        """Whether a link has a length; it has none between joints that coincide."""
+        return bool(np.linalg.norm(self.link_vectors_m[link]) > _SHORTEST_M)
 
     def longest_weight_torque_Nm(self, joint: int) -> float:  # noqa: N802 - units in names keep their case
         """Estimate the largest torque on a joint, given by its index, by all declared
