@@ -30,7 +30,6 @@ from elastocal.diagnosis.verdict import (
     rank_hypotheses,
     warn_of_excess_scatter,
 )
-from elastocal.fitting.model import get_joint_compliances
 
 SETTINGS = Settings()
 

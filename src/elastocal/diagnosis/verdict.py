@@ -25,8 +25,8 @@ from scipy.special import chdtrc, fdtrc
 
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.model_averaging import compute_extra_squares
-from elastocal.fitting.noise import count_effective_parameters
 from elastocal.fitting.least_squares import compute_negative_compliances
+from elastocal.fitting.noise import count_effective_parameters
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
