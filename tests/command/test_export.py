@@ -6,12 +6,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from analysed_robots import analysed
+from analysed_robots import ROBOTS, analysed
 from made_urdf import joint, link
 from made_urdf import robot as make_urdf
 
+from elastocal.application.accuracy import (
+    predict_campaign_accuracy,
+    select_campaign_commands,
+)
+from elastocal.application.calibrated import predict_poses
 from elastocal.campaigns.reading import read_robot
 from elastocal.exchange.urdf import robot_from_urdf
+from elastocal.loop.calibrated_files import load_diagnosed
 from elastocal.mechanics.kinematics import compute_poses
 
 ANGLES = 0.5 * np.linspace(-1, 1, 6)[None]
@@ -91,6 +97,25 @@ def test_only_the_joint_origins_of_the_users_urdf_are_changed(exported, tmp_path
     text = (folder / "robot.urdf").read_text()
     assert text.count('effort="1"') == 6 and "<!-- mine -->" in text
     assert text != (tmp_path / "mine.urdf").read_text()
+
+
+def test_the_error_of_the_urdf_itself_is_stated(exported, in_checkout):
+    """It holds no springs, so that it errs by far more than the corrected robot."""
+    result, folder = exported
+    answer = join_lines(result.stderr)
+    stated = re.search(r"robot\.urdf alone: (\S+) mm RMS .* errs by (\S+) mm", answer)
+    calibrated = load_diagnosed("made", ROBOTS, in_checkout).calibrated
+    commands, wrench = select_campaign_commands(calibrated)
+    reached, _ = predict_poses(calibrated, commands, wrench)
+    end = calibrated.robot.chain.end_effector
+    chain = robot_from_urdf(folder / "robot.urdf", "base", end.name).robot.chain
+    position, _ = compute_poses(
+        chain, calibrated.robot.model_angles(commands), chain.end_effector
+    )
+    rms_mm = 1e3 * np.sqrt(((position - reached) ** 2).sum(axis=1).mean())
+    accuracy_mm = 1e3 * predict_campaign_accuracy(calibrated).rms_m
+    assert float(stated[1]) == pytest.approx(np.hypot(rms_mm, accuracy_mm), rel=0.01)
+    assert accuracy_mm < float(stated[1]) <= float(stated[2])
 
 
 def test_the_urdf_has_the_poses_of_the_robot_file(exported):

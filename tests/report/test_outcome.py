@@ -34,4 +34,6 @@ def test_the_outcome_names_reports_and_verdicts(tmp_path):
     assert lines["named"][0].startswith(
         "✓ cell7: The declared model lacks one mechanism"
     )
-    assert lines["named"][-1] == "next: elastocal correct, elastocal certificate"
+    assert lines["named"][-1] == (
+        "next: elastocal correct, elastocal certificate, elastocal verify"
+    )

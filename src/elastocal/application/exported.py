@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.application.calibrated import predict_poses, remove_effects
+from elastocal.application.frames import root_mean_square, subtract_placement
 from elastocal.effects.conditions import MASS_PARAMETERS
 from elastocal.exchange.urdf import read_urdf
 from elastocal.exchange.urdf_writing import find_nominal_chain
 from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
-from elastocal.mechanics.kinematics import compute_poses
+from elastocal.mechanics.kinematics import compute_pose_differences, compute_poses
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -135,32 +136,55 @@ def compute_left_out_displacements_m(
     return np.linalg.norm(position - folded_position, axis=1)
 
 
-def compute_urdf_deviation_m(
-    urdf: CorrectedUrdf,
-    path: Path,
-    nominal: Robot,
-    folded: Robot,
-    reported_angles: np.ndarray,
-) -> float:
-    """Compute the largest distance between the end effectors of a corrected URDF and of
-    the robot file.
+def compute_urdf_poses(
+    urdf: CorrectedUrdf, path: Path, nominal: Robot, reported_angles: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the poses of the end effector by a corrected URDF.
 
     Parameters
     ----------
     urdf, path : the corrected URDF and the file to which it was written.
     nominal : robot before the calibration, whose joint angles the URDF keeps.
-    folded : robot of the file.
-    reported_angles : (N, n) commands at which both are compared, rad.
+    reported_angles : (N, n) commands, rad.
 
     Returns
     -------
-    Distance, m.
+    Position (N, 3), m, and rotation (N, 3, 3), base axes.
     """
     chain = find_nominal_chain(read_urdf(path), urdf.base, urdf.tip, path.as_posix())
-    urdf_position, _ = compute_poses(
+    return compute_poses(
         chain, nominal.model_angles(reported_angles), chain.end_effector
     )
+
+
+def compute_urdf_deviation_m(
+    urdf_position: np.ndarray, folded: Robot, reported_angles: np.ndarray
+) -> float:
+    """Compute the largest distance, m, between the end effectors of a corrected URDF,
+    (N, 3), and of the rigid robot of the robot file at commands (N, n), rad."""
     position, _ = compute_poses(
         folded.chain, folded.model_angles(reported_angles), folded.chain.end_effector
     )
     return float(np.linalg.norm(urdf_position - position, axis=1).max())
+
+
+def compute_file_error_m(
+    calibrated: CalibratedRobot,
+    position: np.ndarray,
+    rotation: np.ndarray,
+    reported_angles: np.ndarray,
+    wrench: np.ndarray,
+) -> float:
+    """Compute the RMS position error of a robot that is commanded by a file, m.
+
+    Parameters
+    ----------
+    calibrated : the robot. Its scope says in which frame the error is stated.
+    position, rotation : (N, 3), m, and (N, 3, 3) poses by the file, base axes.
+    reported_angles, wrench : (N, n) commands, rad, and (N, 6) loads, N and N m, at which
+        the robot comes to rest elsewhere.
+    """
+    reached = predict_poses(calibrated, reported_angles, wrench)
+    differences = compute_pose_differences(position, rotation, *reached)[..., None]
+    residual = subtract_placement(calibrated.scope, *reached, differences)
+    return root_mean_square(residual[:, :3, 0])

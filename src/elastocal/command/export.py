@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -52,7 +53,13 @@ def export(
     from rich.console import Console
 
     from elastocal.application.accuracy import predict_campaign_accuracy
-    from elastocal.application.exported import compute_urdf_deviation_m, fold_effects
+    from elastocal.application.calibrated import compute_nominal_poses
+    from elastocal.application.exported import (
+        compute_file_error_m,
+        compute_urdf_deviation_m,
+        compute_urdf_poses,
+        fold_effects,
+    )
     from elastocal.application.statements import format_accuracy
     from elastocal.exchange.urdf_writing import write_calibrated_origins
     from elastocal.io.atomic_writes import write_together
@@ -80,10 +87,18 @@ def export(
         _write_robot(partial / ROBOT, folded, campaign.name)
         if corrected is not None:
             (partial / URDF).write_bytes(corrected.content)
+            urdf_poses = compute_urdf_poses(
+                corrected, partial / URDF, nominal, commands
+            )
             deviation_m = compute_urdf_deviation_m(
-                corrected, partial / URDF, nominal, folded.robot, commands
+                urdf_poses[0], folded.robot, commands
             )
             details += [str(output / URDF), *_describe_urdf(corrected, deviation_m)]
+            urdf_m, original_m = (
+                compute_file_error_m(calibrated, *poses, commands, states.wrench)
+                for poses in (urdf_poses, compute_nominal_poses(nominal, commands))
+            )
+            details.append(_describe_urdf_error(urdf_m, original_m, accuracy.rms_m))
     note_written_files(files, find_workplace())
     print_answer(
         f"{campaign.name}: calibrated robot in {output}",
@@ -175,3 +190,21 @@ def _describe_urdf(corrected: CorrectedUrdf, deviation_m: float) -> list[str]:
             f" up to {deviation_mm:.3f} mm at the measured poses"
         )
     return sentences
+
+
+def _describe_urdf_error(urdf_m: float, original_m: float, corrected_m: float) -> str:
+    """Say by how much a robot errs that is commanded by the URDF.
+
+    Parameters
+    ----------
+    urdf_m, original_m : RMS distances of the poses of the URDF, and of the URDF before the
+        calibration, from those of the calibrated robot.
+    corrected_m : RMS error of the calibrated robot itself.
+    """
+    error_mm = 1e3 * math.hypot(urdf_m, corrected_m)
+    original_mm = 1e3 * math.hypot(original_m, corrected_m)
+    return (
+        f"{URDF} alone: {error_mm:.3f} mm RMS at the measured poses and loads, where the"
+        f" original errs by {original_mm:.3f} mm: a URDF holds no sag and no springs, and"
+        " only corrected targets have the accuracy above"
+    )

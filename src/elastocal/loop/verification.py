@@ -44,6 +44,7 @@ from elastocal.io.atomic_writes import write_text, write_together
 from elastocal.io.documents import LARGEST_BYTES
 from elastocal.io.records import compute_sha256
 from elastocal.io.texts import read_text
+from elastocal.loop.diagnosis_tables import restore_step_model
 from elastocal.loop.loading import read_described_campaign
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.validation.conformity import PASS, UNDECIDED, decide_conformity
@@ -287,12 +288,15 @@ def _choose_target(campaign: Campaign, measured: TargetMeasurements) -> Target:
 def _relate_to_end_effector(
     target: Target, campaign: DiagnosedCampaign
 ) -> tuple[float, ...] | None:
-    """Return the offset of a target from the corrected point, in its frame; None if it
-    is unknown."""
+    """Return the offset of a target from the corrected point, in its frame, as the
+    diagnosis has estimated it; None if the campaign does not declare it."""
     if target.offset_m is None:
         return None
-    point = campaign.calibrated.robot.chain.end_effector.offset_m
-    return tuple(np.subtract(target.offset_m, point).tolist())
+    case = campaign.case
+    _, estimate = restore_step_model(case, campaign.facts["steps"][-1])
+    number = [at_point.name for at_point in case.campaign.targets].index(target.name)
+    point = case.campaign.robot.chain.end_effector.offset_m
+    return tuple((estimate.target_offset[number] - np.array(point)).tolist())
 
 
 def _average_measurements(

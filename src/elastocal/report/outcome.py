@@ -68,7 +68,7 @@ def _describe_campaign(name: str, verdict: Verdict) -> list[str]:
 
 def _advise(verdict: Verdict) -> str:
     if _is_correctable(verdict):
-        return "next: elastocal correct, elastocal certificate"
+        return "next: elastocal correct, elastocal certificate, elastocal verify"
     return 'next: "What to do now" on the first page of the report'
 
 
