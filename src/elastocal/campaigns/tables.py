@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from elastocal.campaigns.foreign_files import read_foreign_lines
 from elastocal.counting import format_count
 from elastocal.errors import InputError, find_control_character, suggest_names
 from elastocal.io.texts import (
@@ -97,12 +98,14 @@ class Dialect:
     separator, decimal : names in `SEPARATORS` and `DECIMALS`.
     header : line with the names of the columns, from 1.
     encoding : as Python names it.
+    sheet : sheet of a workbook, or variable of a MATLAB file; None for the only one.
     """
 
     separator: str | None = None
     decimal: str | None = None
     header: int | None = None
     encoding: str | None = None
+    sheet: str | None = None
 
 
 _UNSTATED = Dialect()
@@ -331,7 +334,7 @@ def read_text_table(  # noqa: PLR0913 - independent options
         numbers can be read in two ways.
     """
     source = Path(path).as_posix()
-    lines, encoding = _read_lines(path, stated.encoding)
+    lines, encoding = _read_lines(path, stated, has_names=bool(names))
     data_lines, comments = _separate_comments(lines)
     if not data_lines:
         raise InputError(
@@ -364,15 +367,18 @@ def read_text_table(  # noqa: PLR0913 - independent options
         columns = _with_decimal_points(columns)
     return TextTable(
         source,
-        Dialect(header.separator, decimal, header.line or None, encoding),
+        Dialect(header.separator, decimal, header.line or None, encoding, stated.sheet),
         columns,
         tuple(line_numbers),
         {name: unit for name, unit in units.items() if unit and name in columns},
     )
 
 
-def _read_lines(path: str | Path, encoding: str | None) -> tuple[list[str], str]:
-    """Return the lines as editors count them, and the encoding.
+def _read_lines(
+    path: str | Path, stated: Dialect, *, has_names: bool
+) -> tuple[list[str], str]:
+    """Return the lines as editors count them, or the rows of a workbook, and the
+    encoding.
 
     The encoding is the stated one, that of a byte order mark, or UTF-8. Control
     characters and marks that change the direction of writing are refused.
@@ -380,7 +386,12 @@ def _read_lines(path: str | Path, encoding: str | None) -> tuple[list[str], str]
     content = read_bytes(
         path, LARGEST_BYTES, "a table with a line for each measurement"
     )
-    text, encoding = _decode_table(content, path, encoding)
+    foreign_lines = read_foreign_lines(content, path, stated.sheet, has_names=has_names)
+    encoding = "utf-8"
+    if foreign_lines is None:
+        text, encoding = _decode_table(content, path, stated.encoding)
+    else:
+        text = "\n".join(foreign_lines)
     count = text.count("\n") + text.count("\r") - text.count("\r\n")
     if text[-1:] not in ("\n", "\r"):
         count += 1

@@ -135,7 +135,9 @@ def dh(
     )
 )
 def csv(
-    file: Annotated[Path, Argument(help="The table: CSV, tabs, semicolons, spaces.")],
+    file: Annotated[
+        Path, Argument(help="The table: CSV, tabs, semicolons, spaces, .xlsx, .mat.")
+    ],
     *,
     folder: Annotated[
         Path, Option(help="Folder of the campaign; measurements.csv goes there.")
@@ -171,6 +173,10 @@ def csv(
     encoding: Annotated[
         str | None,
         Option(help="Such as cp1252. Default: UTF-8, or UTF-16 by its mark."),
+    ] = None,
+    sheet: Annotated[
+        str | None,
+        Option(help="Sheet of a workbook, or variable of a MATLAB file, of several."),
     ] = None,
     header: Annotated[
         int | None,
@@ -225,6 +231,7 @@ def csv(
         decimal=decimal,
         header=header,
         encoding=encoding,
+        sheet=sheet,
         columns=parse_pairs("--column", column),
         units=parse_units(unit, angles, lengths),
         rotation=rotation,
