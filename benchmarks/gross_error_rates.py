@@ -47,6 +47,7 @@ SLIPS = ("lost_beam", "held_point", "mistyped_angle", "swapped_rows", "unit")
 # Range of the size of an effect, in plausible sizes.
 SMALLEST_TIMES = 1.0
 LARGEST_TIMES = 10.0
+LARGEST_ORDINARY_TIMES = 3.0
 # Range of the quantile of the poses beyond which an effect of the edge acts.
 EDGES = (0.8, 0.95)
 # Displacement at the farthest pose of the edge, m, at its plausible size.
@@ -85,7 +86,8 @@ def plant_effect(robot, effect, seed):
     if effect is None:
         return robot
     draws = np.random.default_rng([seed, 2])
-    times = SMALLEST_TIMES * (LARGEST_TIMES / SMALLEST_TIMES) ** draws.random()
+    largest = LARGEST_TIMES if effect in LOCAL_EFFECTS else LARGEST_ORDINARY_TIMES
+    times = SMALLEST_TIMES * (largest / SMALLEST_TIMES) ** draws.random()
     simulated = robot.simulated
     arm = simulated.arm
     if effect in KINDS:
@@ -99,23 +101,21 @@ def plant_effect(robot, effect, seed):
             robot,
             simulated=apply_defects(simulated, [Defect(effect, location, size, seed)]),
         )
-    angle = robot.schedule.angle
+    return replace(robot, simulated=add_edge_effect(robot, effect, times, draws))
+
+
+def add_edge_effect(robot, effect, times, draws):
+    """Add an error of a joint that grows from an edge of an angle, or of the reach, on."""
+    simulated = robot.simulated
+    joint = int(draws.integers(1, 3))
+    law = partial(follow_reach, simulated)
     if effect == "compensator_end":
-        joint = int(draws.integers(1, 3))
-        scale = draws.choice([-1.0, 1.0])
-        law = partial(follow_angle, joint, scale)
-    else:
-        joint = int(draws.integers(1, 3))
-        law = partial(follow_reach, simulated)
-    state = law(angle)
+        law = partial(follow_angle, joint, draws.choice([-1.0, 1.0]))
+    state = law(robot.schedule.angle)
     edge = np.quantile(state, draws.uniform(*EDGES))
-    # The displacement grows beyond the edge from zero.
-    rad = times * EDGE_M / arm.reach_m / (state.max() - edge)
-    return replace(
-        robot,
-        simulated=add_drive_law(
-            simulated, joint, lambda angles: rad * np.maximum(law(angles) - edge, 0.0)
-        ),
+    rad = times * EDGE_M / simulated.arm.reach_m / (state.max() - edge)
+    return add_drive_law(
+        simulated, joint, lambda angles: rad * np.maximum(law(angles) - edge, 0.0)
     )
 
 
