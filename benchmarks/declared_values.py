@@ -54,7 +54,7 @@ from elastocal_proof.plant.simulated_robot import (
 
 ROBOTS = ("kuka", "iiwa14", "ur5", "gen3")
 LIMITED_TURN_DEG = 170.0
-HELD_OUT = 60
+HELD_OUT = 20
 # Geometry errors of each link, of an ordinary robot.
 SHIFT_M = 2e-4
 TURN_RAD = 2e-4
@@ -69,6 +69,7 @@ CAMPAIGN = {
     "robot": "robot.yaml",
     "measured": "position",
     "compliance": "nominal",
+    "remainder": "none",
 }
 
 

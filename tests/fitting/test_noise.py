@@ -18,6 +18,7 @@ from support import chain_of
 from synthetic import make_estimate, make_measurements, make_model
 
 from elastocal.campaigns.campaign import Campaign, Target
+from elastocal.effects.catalogue import declared_candidates
 from elastocal.fitting import noise as noise_module
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import Case, build_declared_model
@@ -37,6 +38,7 @@ from elastocal.fitting.noise import (
     set_prior_scale,
 )
 from elastocal.fitting.observations import average_repeats
+from elastocal.mechanics.sites import build_sites
 
 TARGETS = tuple(
     Target(name, point, (0.1, 0.05, 0.0))
@@ -466,3 +468,20 @@ def test_without_repeats_or_declaration_noise_is_the_root_mean_square_of_the_res
     np.testing.assert_array_equal(noise.joint_rad, np.zeros(6))
     assert len(warnings) == 1
     assert "no repeats and no declared noise" in warnings[0]
+
+
+@pytest.mark.parametrize("offset_std_m", [0.0, 2e-4])
+def test_the_tool_is_known_no_better_than_the_reflectors_on_it(kuka, offset_std_m):
+    scale = 0.1
+    sites = build_sites(kuka)
+    links = declared_candidates(["link_geometry"], sites)
+    target = Target("A", "6DoF", (0.1, 0.0, 0.0), offset_std_m=offset_std_m)
+    model = set_prior_scale(make_model(kuka, (target,), effects=links), scale)
+    for effect in model.effects:
+        usual = np.array([scale * p.plausible for p in effect.parameters])
+        is_tool = effect.joints == (kuka.joints,)
+        added = offset_std_m * np.array([p.unit == "m" for p in effect.parameters])
+        expected = np.hypot(usual, added * is_tool)
+        np.testing.assert_allclose(
+            [p.prior_std for p in effect.parameters], expected, rtol=1e-12
+        )

@@ -67,7 +67,7 @@ def _warn_of_geometry(final: Fit) -> Iterator[str]:
     limit = (1.0 - _SAME) * PRIOR_SCALES[-1]
     for effect in final.model.effects:
         is_declared = effect.effect in geometry
-        if is_declared and any(
+        if is_declared and all(
             parameter.prior_std is not None
             and parameter.prior_std > limit * parameter.plausible
             for parameter in effect.parameters

@@ -311,7 +311,10 @@ def describe_reference_point(campaign: Campaign) -> str:
             descriptions.append(f"{target.name}, whose offset was fitted")
         else:
             offset = _format_millimetres(target.offset_m)
-            descriptions.append(f"{target.name} at {offset} of it")
+            uncertainty = ""
+            if target.has_inexact_offset:
+                uncertainty = f", known to {1e3 * target.offset_std_m:.2g} mm"
+            descriptions.append(f"{target.name} at {offset} of it{uncertainty}")
     return f"All errors are those of {end}, measured by the target {'; '.join(descriptions)}."
 
 

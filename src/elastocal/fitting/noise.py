@@ -564,16 +564,42 @@ def _has_no_fixed_prior(effect: Candidate) -> bool:
 
 
 def set_prior_scale(model: Model, scale: float) -> Model:
-    """Set priors on the declared geometry of a model, `scale` in plausible sizes."""
+    """Set priors on the declared geometry of a model, `scale` in plausible sizes.
+
+    The end of the last link is the tool, which is declared no better than the reflectors
+    on it, however well the robot is made.
+    """
     geometry = find_declared_geometry(model)
+    tool_std_m = _find_tool_std_m(model)
+    tool_key = f"link_geometry@{model.sites.joints}"
     effects = []
     for effect in model.effects:
         if effect.effect in geometry:
             deviations = [scale * p.plausible for p in effect.parameters]
+            if effect.key == tool_key:
+                deviations = [
+                    float(np.hypot(deviation, tool_std_m * (parameter.unit == "m")))
+                    for deviation, parameter in zip(
+                        deviations, effect.parameters, strict=True
+                    )
+                ]
             effects.append(set_prior_std(effect, deviations))
         else:
             effects.append(effect)
     return replace(model, effects=tuple(effects))
+
+
+def _find_tool_std_m(model: Model) -> float:
+    """Find how well the declared tool is known: as its least exact target, m."""
+    end_effector = model.sites.chain.end_effector.name
+    return max(
+        (
+            target.offset_std_m
+            for target in model.targets
+            if target.point == end_effector and target.has_inexact_offset
+        ),
+        default=0.0,
+    )
 
 
 def set_prior_std(
