@@ -1,9 +1,13 @@
 """A campaign's folder: begun, checked, and diagnosed by its Snakemake target."""
 
+import io
+import time
+
 import numpy as np
 import pytest
 from analysed_robots import analysed
 from made_folders import make_folder, make_table
+from rich.console import Console
 
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.command import campaign
@@ -155,3 +159,23 @@ def test_a_path_that_snakemake_takes_for_something_else_is_refused(
 def test_a_folder_is_not_taken_for_its_neighbour(refusal, tmp_path, name):
     """Snakemake removes quotes and blanks at the ends of a value."""
     assert "a path without it" in refusal("diagnose", tmp_path / name)
+
+
+def test_a_terminal_shows_for_how_long_the_last_step_has_been_at_work():
+    """The line moves between the lines of the run, and files get none of it."""
+
+    def slow_lines():
+        yield "Using workflow specific profile x\n"
+        yield "2 of 6: diagnose_campaign cell\n"
+        time.sleep(1.2)
+        yield "Nothing to be done.\n"
+
+    shown = io.StringIO()
+    terminal = Console(file=shown, force_terminal=True, width=80)
+    assert campaign._follow_run(slow_lines(), terminal)
+    assert shown.getvalue().count("2 of 6: diagnose_campaign cell") > 3
+    assert "0:00:01" in shown.getvalue()
+    written = io.StringIO()
+    assert campaign._follow_run(slow_lines(), Console(file=written))
+    lines = written.getvalue().splitlines()
+    assert lines == ["2 of 6: diagnose_campaign cell", "Nothing to be done."]

@@ -54,12 +54,11 @@ def test_what_a_job_wrote_is_checked_by_the_next(job):
     )
     run(copied, following)
     Path(OUTPUT).write_text("2\n")
-    with pytest.raises(SystemExit) as ended:
+    with pytest.raises(SystemExit):
         run(copied, following)
-    assert str(ended.value).startswith(
-        f"{OUTPUT}: found other contents than were written; allowed: "
-    )
-    assert log(following) == f"{ended.value}\n"
+    refusal = f"{OUTPUT}: found other contents than were written; allowed: "
+    assert log(following).startswith(refusal)
+    assert len(log(following).splitlines()) == 1
 
 
 @pytest.mark.parametrize(
@@ -80,11 +79,14 @@ def test_bad_input_and_faults_of_the_machine_are_one_line(job, fault, line):
     def step(_):
         raise fault
 
+    is_input = isinstance(fault, InputError)
     with pytest.raises(SystemExit) as ended:
         run(step, job)
-    assert str(ended.value).startswith(line) and len(str(ended.value).splitlines()) == 1
-    assert log(job).splitlines()[-1] == str(ended.value)
-    assert ("Traceback" in log(job)) == (not isinstance(fault, InputError))
+    last_line = log(job).splitlines()[-1]
+    assert last_line.startswith(line)
+    # The logger repeats the line of bad input; a full disk may have no log.
+    assert ended.value.code == (1 if is_input else last_line)
+    assert ("Traceback" in log(job)) == (not is_input)
 
 
 @pytest.mark.parametrize(

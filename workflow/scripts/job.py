@@ -39,7 +39,7 @@ def run(
 ) -> None:
     """Run a step as a job: check its inputs, call it, and record what it has written.
 
-    An `InputError` or a fault of the machine ends the job with one line.
+    An `InputError` or a fault of the machine ends the job with one line in its log.
 
     Parameters
     ----------
@@ -64,7 +64,9 @@ def run(
             write_records(_build_record(snakemake, started, digests, unrecorded))
     except InputError as error:
         write_log(log, f"{error}\n")
-        sys.exit(str(error))
+        # The logger prints the last line of the log when the run ends, so the job itself
+        # stays silent and the reason is given once.
+        sys.exit(1)
     except (OSError, MemoryError) as error:
         # Errors of pyarrow do not name the file.
         file = next(iter(snakemake.output), "disk")

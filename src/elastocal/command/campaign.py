@@ -23,14 +23,18 @@ from elastocal.command.terminal import (
     print_lines,
 )
 from elastocal.counting import format_count
-from elastocal.errors import InputError
+from elastocal.errors import InputError, escape_control_characters
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from rich.console import Console
 
 _ROBOT = "robot.yaml"
 # Snakemake prints the second line before its logger begins.
 _NOTHING_TO_DO = "Nothing to be done"
+# Characters of a line that a terminal repeats while the step is at work.
+_LONGEST_STEP = 60
 _PROFILE_NOTICE = "Using workflow specific profile"
 
 
@@ -174,7 +178,6 @@ def diagnose(
     # An installed pipeline runs in the working directory.
     if snakefile.parent != workplace:
         arguments += ["--snakefile", str(snakefile)]
-    nothing_to_do = False
     with subprocess.Popen(
         [sys.executable, *arguments],
         cwd=workplace,
@@ -182,14 +185,39 @@ def diagnose(
         stderr=subprocess.STDOUT,
         text=True,
     ) as process:
-        for line in map(str.rstrip, process.stdout or ()):
-            nothing_to_do = nothing_to_do or line.startswith(_NOTHING_TO_DO)
-            if not line.startswith(_PROFILE_NOTICE):
-                print_lines([line], console)
+        nothing_to_do = _follow_run(process.stdout or (), console)
     # If there is nothing to do, Snakemake prints no outcome.
     if nothing_to_do and not process.returncode:
         _print_outcome(folder, workplace, console)
     raise typer.Exit(process.returncode)
+
+
+def _follow_run(lines: Iterable[str], console: Console) -> bool:
+    """Print the lines of a run as they come; return whether there was nothing to do.
+
+    A terminal shows below them for how long the last step has been at work, so that a
+    long fit does not look like a program that hangs.
+    """
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    nothing_to_do = False
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}", markup=False),
+        TimeElapsedColumn(),
+    )
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as progress:
+        task = progress.add_task("", total=None)
+        for line in map(str.rstrip, lines):
+            nothing_to_do = nothing_to_do or line.startswith(_NOTHING_TO_DO)
+            if line.startswith(_PROFILE_NOTICE):
+                continue
+            print_lines([line], console)
+            step = escape_control_characters(line)[:_LONGEST_STEP]
+            progress.reset(task, total=None, description=step)
+    return nothing_to_do
 
 
 def _join_measurements(
