@@ -68,6 +68,15 @@ def test_a_number_or_name_with_a_unit_is_refused(tmp_path, header):
     ].tolist() == [4]
 
 
+def test_joints_are_counted_from_0_if_an_option_says_so(tmp_path):
+    text = "q[0],q[1],q[2],x,y,z\n10,20,30,1,2,3\n"
+    first = table(tmp_path, text, replace(PLAIN, columns={"q1": "q[0]"}))
+    angles = [first.table[f"q{joint}"][0] for joint in (1, 2, 3)]
+    np.testing.assert_allclose(angles, np.radians([10.0, 20.0, 30.0]))
+    every = {f"q{joint + 1}": f"q[{joint}]" for joint in range(3)}
+    assert table(tmp_path, text, replace(PLAIN, columns=every)).joints == 3
+
+
 TWO_JOINTS = robot_of("Rz(q1) Tx(1) Rz(q2) [A]")
 A_RAIL = robot_of("Tx(q1) Rz(q2) [A]")
 

@@ -242,6 +242,7 @@ def find_columns(
                 f"no column {stated_header!r}",
                 suggest_names(stated_header, list(text.columns)),
             )
+    mapped = _name_joints_from_zero(text, mapped)
     columns = dict(mapped)
     stated_units: dict[str, str] = {}
     for header in _recognize_headers(text, mapped, robot):
@@ -267,6 +268,25 @@ def find_columns(
         if header.unit is not None:
             stated_units[name] = header.unit
     return columns, stated_units
+
+
+def _name_joints_from_zero(
+    text: TextTable, mapped: Mapping[str, str]
+) -> dict[str, str]:
+    """Name all joints of a table that counts them from 0, if an option names its joint 0
+    as the first; joints that options name themselves stay as they are."""
+    numbers = {}
+    for header in text.columns:
+        joint = _JOINT.fullmatch(_simplify(split_unit(header)[0]))
+        if joint:
+            numbers[header] = (joint[1], int(joint[2]))
+    family, first = numbers.get(mapped.get("q1", ""), ("", -1))
+    named = dict(mapped)
+    if first == 0:
+        for header, (letters, number) in numbers.items():
+            if letters == family and header not in mapped.values():
+                named.setdefault(f"q{number + 1}", header)
+    return named
 
 
 def find_euler_columns(text: TextTable, notation: str | None) -> dict[str, str]:

@@ -43,6 +43,7 @@ from elastocal.exchange.pose_table import (
     read_rotation_vectors,
 )
 from elastocal.exchange.times import find_times_of_day, read_times
+from elastocal.exchange.unwrapping import unwrap_into_limits
 from elastocal.io.storage import Columns
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
@@ -171,10 +172,8 @@ def read_measurement_table(
     check_option_names(options)
     source = _read_source(path, options, robot, joint_file)
     text = source.text
-    headers = source.headers
     options = replace(options, units={**options.units, **source.units})
-    notes = source.notes
-    layout = _find_layout(text, headers, options, robot)
+    layout = _find_layout(text, source.headers, options, robot)
     units = find_units(
         text,
         layout.columns,
@@ -184,15 +183,10 @@ def read_measurement_table(
         robot,
     )
     rows = _find_filled_rows(layout, skip_empty=options.skip_empty)
-    optional = _read_optional_columns(layout, headers, options, rows)
+    optional = _read_optional_columns(layout, source.headers, options, rows)
     cells = text.cells(layout.columns, find_scales(units), rows)
-    table = _read_columns(cells, layout, options) | optional.columns
-    for joint in layout.angles:
-        approach = f"approach{joint[1:]}"
-        if approach in layout.columns:
-            table[approach] = cells.numbers(approach)
-    table["target"] = _read_targets(cells, options.target)
-    table |= _number_loads_and_repeats(cells, table)
+    joint_angles, unwrapping = _read_joint_angles(cells, layout, robot)
+    table = _read_columns(cells, layout, options, joint_angles) | optional.columns
     used = {
         name: header
         for name, header in layout.columns.items()
@@ -214,7 +208,7 @@ def read_measurement_table(
         resolved,
         (*ignored, *options.ignore),
         len(text.lines) - len(rows),
-        (*notes, *optional.notes),
+        (*source.notes, *unwrapping, *optional.notes),
     )
 
 
@@ -250,13 +244,13 @@ def _read_source(
         return source
     if joint_file.is_sheet:
         return _join_sheet(source, options, robot, joint_file.path)
-    other = _read_joint_angles(joint_file.path, options)
+    other = _read_joint_file(joint_file.path, options)
     joined = join_files(text, other, options.join, skip_empty=options.skip_empty)
     text = _leave_out(joined.text, options.ignore)
     return _Source(text, headers, {}, notes + joined.notes)
 
 
-def _read_joint_angles(path: Path, options: ImportOptions) -> TextTable:
+def _read_joint_file(path: Path, options: ImportOptions) -> TextTable:
     """Read the cells of a file of joint angles."""
     names = () if _name_positions(options) else options.names
     return read_cells(path, replace(options, names=names, ignore=(), header=None))
@@ -478,12 +472,11 @@ def _find_filled_rows(layout: PoseTable, *, skip_empty: bool) -> np.ndarray:
 
 
 def _read_columns(
-    cells: Cells, layout: PoseTable, options: ImportOptions
+    cells: Cells, layout: PoseTable, options: ImportOptions, joint_angles: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Read pose numbers, joint angles, wrench, position and orientation."""
-    table = _number_poses(cells, layout.angles)
-    for name in layout.angles:
-        table[name] = cells.numbers(name)
+    """Read all columns that measurements need, with these joint angles (N, n)."""
+    table = _number_poses(cells, joint_angles)
+    table |= dict(zip(layout.angles, joint_angles.T, strict=True))
     if layout.wrench:
         sign = -1.0 if options.wrench == "by-robot" else 1.0
         for name in WRENCH_NAMES:
@@ -497,7 +490,24 @@ def _read_columns(
     if layout.orientation:
         vectors = read_rotation_vectors(cells, layout)
         table |= dict(zip(VECTOR, vectors.T, strict=True))
-    return table
+    for joint in layout.angles:
+        approach = f"approach{joint[1:]}"
+        if approach in layout.columns:
+            table[approach] = cells.numbers(approach)
+    table["target"] = _read_targets(cells, options.target)
+    return table | _number_loads_and_repeats(cells, table)
+
+
+def _read_joint_angles(
+    cells: Cells, layout: PoseTable, robot: Robot | None
+) -> tuple[np.ndarray, list[str]]:
+    """Read joint angles (N, n), rad, within the limits of a robot if there is one, and
+    sentences about those that were beyond."""
+    joint_angles = cells.matrix(layout.angles)
+    if robot is None:
+        return joint_angles, []
+    headers = [layout.columns[name] for name in layout.angles]
+    return unwrap_into_limits(joint_angles, robot, headers)
 
 
 def _read_optional_columns(
@@ -572,14 +582,14 @@ def _read_targets(cells: Cells, stated_name: str | None) -> np.ndarray:
     return np.array(names)
 
 
-def _number_poses(cells: Cells, angles: Sequence[str]) -> dict[str, np.ndarray]:
+def _number_poses(cells: Cells, joint_angles: np.ndarray) -> dict[str, np.ndarray]:
     """Read session and pose; a pose that no column numbers consists of the rows with
     the same joint angles."""
     table: dict[str, Any] = {}
     if "session" in cells.columns:
         table["session"] = cells.integers("session")
     if "pose" not in cells.columns:
-        table["pose"] = number_close_points(cells.matrix(angles), SAME_POSE) + 1
+        table["pose"] = number_close_points(joint_angles, SAME_POSE) + 1
         return table
     labels = cells.texts("pose")
     if all(label.isdigit() for label in labels):
