@@ -145,9 +145,29 @@ FAULTS = {
     ),
     "nothing": (JOINT_ROW + "1,0,,0,90,R\n", "line 2, column d_m", ["nothing"]),
     "a type": (
+        JOINT_ROW + "1,0,0,0,90,S\n",
+        "line 2, column type",
+        ["'S'", "R (revolute), P (prismatic) or F (fixed)"],
+    ),
+    "a prismatic joint without limits": (
         JOINT_ROW + "1,0,0,0,90,P\n",
         "line 2, column type",
-        ["'P'", "revolute"],
+        ["no limits of a prismatic joint", "lower and upper, in m as d"],
+    ),
+    "one limit": (
+        "d_m,a_m,alpha_deg,lower_deg,upper_deg\n0,1,0,-90,\n",
+        "line 2, column upper_deg",
+        ["nothing"],
+    ),
+    "limits in two units": (
+        "d_m,a_m,alpha_deg,lower_deg,upper_rad\n0,1,0,-90,1\n",
+        "header",
+        ["lower in deg and upper in rad"],
+    ),
+    "a rail in millimetres": (
+        "type,d_m,a_m,alpha_deg,lower_deg,upper_deg\nP,0,1,0,0,3000\n",
+        "joint_limits_deg[0]",
+        ["3000", "metres"],
     ),
     "no column": ("d_m,a_m\n0,0\n", "header", ["no column alpha"]),
     "no unit": (
@@ -289,3 +309,60 @@ def test_an_invalid_kinematics_file_is_refused(tmp_path, described, key, fragmen
     path = table(tmp_path, yaml.safe_dump({"kinematics": described}), "calib.yaml")
     with refused(path, key, *fragments):
         robot_from_dh(path)
+
+
+RAIL = """joint;type;theta_offset;d;a;alpha;lower;upper
+;;deg;mm;mm;deg;deg;deg
+track;P;0;100,5;0;-90;-500;4000
+base;F;0;675;0;90;;
+a1;R;10;0;350;-90;-185;185
+a2;R;0;0;1150;0;;
+"""
+
+
+@pytest.mark.parametrize("modified", [False, True])
+def test_rails_and_fixed_parts_have_the_poses_of_their_rows(tmp_path, modified):
+    result = robot_from_dh(table(tmp_path, RAIL), modified=modified)
+    robot = parse_robot(yaml.safe_load(format_robot_file(result)))
+    assert robot.joint_names == ("track", "a1", "a2")
+    assert robot.chain.prismatic == (True, False, False)
+    limits = [[-0.5, 4.0], [-185.0, 185.0], [-360.0, 360.0]]
+    limits = np.array(limits) * [[1.0], [math.pi / 180.0], [math.pi / 180.0]]
+    np.testing.assert_allclose(robot.joint_limits, limits)
+    coordinates = np.array([[1.3, 0.4, -0.7]])
+    across = [
+        pin.SE3(
+            pin.exp3(math.radians(alpha) * np.array([1.0, 0, 0])), np.array([a, 0, 0])
+        )
+        for alpha, a in ((-90, 0), (90, 0), (-90, 0.35), (0, 1.15))
+    ]
+    about_z = [
+        screw("z", 0.0, 0.1005 + 1.3),
+        screw("z", 0.0, 0.675),
+        screw("z", math.radians(10) + 0.4, 0.0),
+        screw("z", -0.7, 0.0),
+    ]
+    expected = pin.SE3.Identity()
+    for fixed, moving in zip(across, about_z, strict=True):
+        expected = expected * (fixed * moving if modified else moving * fixed)
+    position, rotation = compute_poses(
+        robot.chain, coordinates, robot.chain.end_effector
+    )
+    np.testing.assert_allclose(position[0], expected.translation, atol=1e-9)
+    np.testing.assert_allclose(rotation[0], expected.rotation, atol=1e-9)
+    assert any("decimal comma" in note for note in result.notes)
+
+
+def test_a_rail_keeps_its_pose_where_long_lengths_cancel(tmp_path):
+    rows = "P,0,0,0,90,0,1\nR,0,300,0,0.01,-90,90\nR,0,-300,0.4,0,-90,90\n"
+    header = "type,theta_offset_deg,d_m,a_m,alpha_deg,lower_deg,upper_deg\n"
+    result = robot_from_dh(table(tmp_path, header + rows))
+    assert any("cancel" in note for note in result.notes)
+    robot = parse_robot(yaml.safe_load(format_robot_file(result)))
+    tilt = pin.SE3(pin.exp3(np.array([math.radians(0.01), 0, 0])), np.zeros(3))
+    expected = screw("z", 0, 0.5) * screw("x", math.pi / 2, 0) * screw("z", 0.3, 300)
+    expected = expected * tilt * screw("z", -0.2, -300) * screw("x", 0, 0.4)
+    position, _ = compute_poses(
+        robot.chain, np.array([[0.5, 0.3, -0.2]]), robot.chain.end_effector
+    )
+    np.testing.assert_allclose(position[0], expected.translation, atol=1e-8)

@@ -142,7 +142,12 @@ def test_without_compliances_typical_ones_count_as_unknown_and_are_never_written
         # Tubes need links that neither change their length nor have fixed rotations.
         *(
             (
-                {"chain": chain, "lengths_m": None, "links": TUBES},
+                {
+                    "chain": chain,
+                    "lengths_m": None,
+                    "joint_limits_deg": [[-3, 3], [-90, 45]],
+                    "links": TUBES,
+                },
                 "links",
                 [feature, "turn at their joints only"],
             )
@@ -150,6 +155,11 @@ def test_without_compliances_typical_ones_count_as_unknown_and_are_never_written
                 ("Rz(q1) Tx(1) Rx(90deg) [A] Ry(q2) Tx(1) [B]", "fixed rotations"),
                 ("Tx(q1) Tz(0.5) Rz(q2) Tx(1) [B]", "prismatic joints"),
             )
+        ),
+        (
+            TRACKED | {"joint_limits_deg": [[-500, 4000], [-180, 180], [-90, 90]]},
+            "joint_limits_deg[0]",
+            ["4000", "metres (not millimetres), 100 m at most"],
         ),
         (
             TRACKED | {"joint_limits_deg": None},

@@ -112,8 +112,9 @@ def dh(
     """Make a robot file of a Denavit-Hartenberg table.
 
     The table has one row for each joint. Columns: theta_offset_deg, d_m, a_m,
-    alpha_deg; optionally joint and type (R). The first two rows of a UR5e, standard
-    notation:
+    alpha_deg; optionally joint, type (R revolute, P prismatic, F fixed) and the limits
+    lower_deg and upper_deg, of a prismatic joint in the unit of d. The first two rows of
+    a UR5e, standard notation:
 
     joint, theta_offset_deg, d_m, a_m, alpha_deg, type
 

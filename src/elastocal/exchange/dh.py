@@ -1,14 +1,16 @@
 """A Denavit-Hartenberg table, checked cell by cell, as the contents of a robot file.
 
-The table has one row for each joint, and all joints are revolute::
+The table has one row for each joint, or for a part that is fixed::
 
-    joint, theta_offset_deg, d_m,    a_m,     alpha_deg
-    1,     0,                0.1625, 0,       90
-    2,     0,                0,      -0.425,  0
+    joint, theta_offset_deg, d_m,    a_m,     alpha_deg, type
+    1,     0,                0.1625, 0,       90,        R
+    2,     0,                0,      -0.425,  0,         R
 
 begins a UR5e in the standard notation. The unit of a column ends its name, is in brackets
 behind it (``[mm]``), or is in a row of units under the header; otherwise an option must
-state it. ``joint`` and a ``type`` of R may be omitted.
+state it. ``type`` is R (revolute, also where the column is omitted), P (prismatic: the
+shift is added to d) or F (fixed). ``joint`` may be omitted, and so may ``lower`` and
+``upper``, the limits, unless a joint is prismatic: its limits have the unit of d.
 
 A row of the standard notation [1] is ``Rz(theta) Tz(d) Tx(a) Rx(alpha)``. A row of Craig's
 modified notation [2] is ``Rx(alpha) Tx(a) Rz(theta) Tz(d)``, with the alpha and a of its
@@ -29,7 +31,7 @@ as the ``origin`` of a URDF, from the base frame of the controller.
 
 import math
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from pathlib import Path
@@ -59,13 +61,31 @@ from elastocal.exchange.robot_text import (
     make_origin_transform,
 )
 from elastocal.io.documents import check_document, read_document
+from elastocal.io.texts import NUMBER_ALLOWED, parse_number
+from elastocal.mechanics.robot import UNLIMITED_DEG
 
 _KINDS = {"theta_offset": ANGLE, "d": LENGTH, "a": LENGTH, "alpha": ANGLE}
+_LIMITS = ("lower", "upper")
+# Types of rows by the first letter.
+_REVOLUTE = "R"
+_PRISMATIC = "P"
+_FIXED = "F"
 _NEEDED = ("d", "a", "alpha")
 _WITHOUT_UNIT = ("joint", "type")
-_USUAL = ("joint", "theta_offset_deg", "d_m", "a_m", "alpha_deg", "type")
+_USUAL = (
+    "joint",
+    "theta_offset_deg",
+    "d_m",
+    "a_m",
+    "alpha_deg",
+    "type",
+    "lower_deg",
+    "upper_deg",
+)
 # Upper bound on the rows of a table; the chain of more does not fit into a robot file.
 _MOST_ROWS = 500
+# Decimals of limits in the robot file, deg or m.
+_DECIMALS = 9
 # Upper bound on the turns of an angle in radians. A larger one, such as 90, is in degrees.
 _LARGEST_TURNS_OF_RADIANS = 2
 # Joint frames are moved along their axes if this makes the sum of all lengths smaller than
@@ -84,10 +104,8 @@ _JOINTS = {
     "forearm": "elbow_joint",
     **{f"wrist_{number}": f"wrist_{number}_joint" for number in (1, 2, 3)},
 }
-_LACKS = [
-    "no masses: the weight of the links is not known",
-    "no limits of any joint: a turn either way",
-]
+_NO_MASSES = "no masses: the weight of the links is not known"
+_NO_LIMITS = "no limits of any joint: a turn either way"
 
 
 @dataclass(frozen=True)
@@ -117,12 +135,16 @@ class _DhTable:
     Attributes
     ----------
     joint_names : names of the joints, empty if the table has none.
-    rows : theta, d, a and alpha of each joint, (n, 4), rad and m.
+    rows : theta, d, a and alpha of each row, (n, 4), rad and m.
+    types : type of each row.
+    limits : lower and upper limit of each joint, deg or m; empty if there are none.
     notes : how the columns were understood.
     """
 
     joint_names: list[str]
     rows: np.ndarray
+    types: list[str]
+    limits: list[list[float]]
     notes: list[str]
 
 
@@ -178,11 +200,16 @@ def robot_from_dh(
                     "a name for every joint, each once",
                 )
         document["joint_names"] = names
-    tokens = _format_rows(table.rows, modified=modified)
-    short_tokens = _format_short_chain(table.rows, modified=modified)
+    if table.limits:
+        document["joint_limits_deg"] = table.limits
+    rows = [*_split_rows(table, modified=modified)]
+    tokens = _format_rows(rows)
+    short_tokens = _format_short_chain(rows)
     length = _sum_lengths(tokens)
     short_length = _sum_lengths(short_tokens)
-    notes = [*table.notes, *_LACKS]
+    notes = [*table.notes, _NO_MASSES]
+    if not table.limits:
+        notes.append(_NO_LIMITS)
     if short_length < _MUCH_SHORTER * length:
         tokens = short_tokens
         notes.append(
@@ -229,14 +256,11 @@ def _read_table(path: str | Path, options: DhOptions) -> _DhTable:
             format_count(len(text.lines), "row"),
             f"at most {_MOST_ROWS}, one for each joint",
         )
-    scales = {name: UNITS[_KINDS[name]][unit] for name, unit in units.items()}
+    scales = {
+        name: UNITS[kind][units[name]] for name, kind in _KINDS.items() if name in units
+    }
     cells = text.cells(headers, scales)
-    if "type" in headers:
-        is_revolute = [
-            joint_type.upper()[:1] in ("R", "") for joint_type in cells.texts("type")
-        ]
-        allowed = "R (revolute); shifts and fixed parts are written into the robot file"
-        cells.refuse(~np.array(is_revolute), ["type"], allowed)
+    types = _read_types(cells)
     rows = np.zeros((len(text.lines), len(_KINDS)))
     for column, name in enumerate(_KINDS):
         if name in headers:
@@ -244,7 +268,70 @@ def _read_table(path: str | Path, options: DhOptions) -> _DhTable:
             if _KINDS[name] == ANGLE:
                 _check_angles(cells, name, rows[:, column], units[name])
     joint_names = cells.texts("joint") if "joint" in headers else []
-    return _DhTable(joint_names, rows, _describe(text, headers, units, options))
+    joint_names = [
+        name for name, kind in zip(joint_names, types, strict=False) if kind != _FIXED
+    ]
+    return _DhTable(
+        joint_names,
+        rows,
+        types,
+        _read_limits(cells, types, units),
+        _describe(text, headers, units, options),
+    )
+
+
+def _read_types(cells: Cells) -> list[str]:
+    """Read the types of the rows; without a column all are revolute."""
+    if "type" not in cells.columns:
+        return [_REVOLUTE] * len(cells.rows)
+    types = [kind.upper()[:1] or _REVOLUTE for kind in cells.texts("type")]
+    is_unknown = [kind not in (_REVOLUTE, _PRISMATIC, _FIXED) for kind in types]
+    allowed = "R (revolute), P (prismatic) or F (fixed)"
+    cells.refuse(np.array(is_unknown), ["type"], allowed)
+    return types
+
+
+def _read_limits(
+    cells: Cells, types: Sequence[str], units: Mapping[str, str]
+) -> list[list[float]]:
+    """Read the limits of the joints, deg or m; none if the table has no column of them.
+
+    A joint without limits may make a turn either way; a prismatic one needs its own.
+    """
+    if "lower" not in units and _PRISMATIC not in types:
+        return []
+    length = UNITS[LENGTH][units["d"]]
+    limits = []
+    for row, kind in enumerate(types):
+        if kind == _FIXED:
+            continue
+        texts = [_read_cell(cells, name, row) for name in _LIMITS]
+        if kind == _PRISMATIC and "" in texts:
+            raise cells.fault(
+                row,
+                "type",
+                f"columns lower and upper, in {units['d']} as d, for a prismatic joint",
+                "no limits of a prismatic joint",
+            )
+        if texts == ["", ""]:
+            limits.append(list(UNLIMITED_DEG))
+            continue
+        scale = length
+        if kind == _REVOLUTE:
+            scale = math.degrees(UNITS[ANGLE][units["lower"]])
+        values = []
+        for name, text in zip(_LIMITS, texts, strict=True):
+            value = parse_number(text)
+            if value is None:
+                raise cells.fault(row, name, NUMBER_ALLOWED)
+            values.append(round(scale * value, _DECIMALS))
+        limits.append(values)
+    return limits
+
+
+def _read_cell(cells: Cells, name: str, row: int) -> str:
+    """Read the text of a cell, "" if the table has no such column."""
+    return cells.texts(name)[row] if name in cells.columns else ""
 
 
 def _find_columns(
@@ -255,7 +342,7 @@ def _find_columns(
     units: dict[str, str] = {}
     for header in text.columns:
         name, stated = (header, None) if header in _WITHOUT_UNIT else split_unit(header)
-        if name not in (*_KINDS, *_WITHOUT_UNIT):
+        if name not in (*_KINDS, *_LIMITS, *_WITHOUT_UNIT):
             suggestion = suggest_names(header, _USUAL)
             raise InputError(
                 text.path,
@@ -269,6 +356,12 @@ def _find_columns(
         if name in _KINDS:
             unit = choose_unit(text, header, stated)
             units[name] = _check_unit(text, header, _KINDS[name], unit, options)
+        elif name in _LIMITS:
+            unit = choose_unit(text, header, stated)
+            units[name] = _check_unit(text, header, ANGLE, unit, options)
+    if len({units.get(name) for name in _LIMITS}) > 1:
+        found = f"lower in {units.get('lower')} and upper in {units.get('upper')}"
+        raise InputError(text.path, "header", found, "both limits, in one unit")
     for name in _NEEDED:
         if name not in headers:
             raise InputError(
@@ -333,45 +426,69 @@ def _describe(
 _Transforms = list[tuple[str, float]]
 
 
-def _split_rows(
-    rows: np.ndarray, *, modified: bool
-) -> Iterator[tuple[_Transforms, _Transforms]]:
+@dataclass(frozen=True)
+class _DhRow:
+    """A row as transforms before and behind the motion of its joint about or along z.
+
+    Attributes
+    ----------
+    before, behind : elementary transforms.
+    motion : "R", "T", or "" if nothing moves.
+    """
+
+    before: _Transforms
+    behind: _Transforms
+    motion: str
+
+
+_MOTIONS = {_REVOLUTE: "R", _PRISMATIC: "T", _FIXED: ""}
+
+
+def _split_rows(table: _DhTable, *, modified: bool) -> Iterator[_DhRow]:
     """Split each row into the transforms before and behind the motion of its joint."""
-    for theta, d, a, alpha in rows.tolist():
+    for (theta, d, a, alpha), kind in zip(
+        table.rows.tolist(), table.types, strict=True
+    ):
         across = [("Tx", a), ("Rx", alpha)]
         if modified:
-            yield [*across, ("Rz", theta)], [("Tz", d)]
+            yield _DhRow([*across, ("Rz", theta)], [("Tz", d)], _MOTIONS[kind])
         else:
-            yield [("Rz", theta)], [("Tz", d), *across]
+            yield _DhRow([("Rz", theta)], [("Tz", d), *across], _MOTIONS[kind])
 
 
-def _format_rows(rows: np.ndarray, *, modified: bool) -> list[str]:
+def _format_rows(rows: Sequence[_DhRow]) -> list[str]:
     """Format a table in the chain notation, row by row."""
     tokens: list[str] = []
-    split_rows = _split_rows(rows, modified=modified)
-    for joint, (before, behind) in enumerate(split_rows, 1):
-        tokens += format_tokens(before)
-        tokens.append(f"Rz(q{joint})")
-        tokens += format_tokens(behind)
+    joint = 0
+    for row in rows:
+        tokens += format_tokens(row.before)
+        if row.motion:
+            joint += 1
+            tokens.append(f"{row.motion}z(q{joint})")
+        tokens += format_tokens(row.behind)
     return tokens
 
 
-def _format_short_chain(rows: np.ndarray, *, modified: bool) -> list[str]:
+def _format_short_chain(rows: Sequence[_DhRow]) -> list[str]:
     """Format a table in the chain notation, with each joint frame at the point of its axis
     that is closest to the joint frame before."""
-    # Fixed transforms before, between and behind the joints, which turn about z.
+    # Fixed transforms before, between and behind the joints, which move about or along z.
     fixed = [np.eye(4)]
-    for before, behind in _split_rows(rows, modified=modified):
-        fixed[-1] = fixed[-1] @ _multiply(before)
-        fixed.append(_multiply(behind))
+    motions = []
+    for row in rows:
+        fixed[-1] = fixed[-1] @ _multiply(row.before)
+        if row.motion:
+            motions.append(row.motion)
+            fixed.append(np.eye(4))
+        fixed[-1] = fixed[-1] @ _multiply(row.behind)
     tokens: list[str] = []
     slide = 0.0
-    for joint, transform in enumerate(fixed[:-1], 1):
-        transform = make_elementary_transform("T", 2, -slide) @ transform
+    for joint, motion in enumerate(motions, 1):
+        transform = make_elementary_transform("T", 2, -slide) @ fixed[joint - 1]
         # Take the point of the next axis that is closest to the current origin.
         slide = -float(transform[:3, 2] @ transform[:3, 3])
         transform = transform @ make_elementary_transform("T", 2, slide)
-        tokens += [*format_displacement(transform), f"Rz(q{joint})"]
+        tokens += [*format_displacement(transform), f"{motion}z(q{joint})"]
     last = make_elementary_transform("T", 2, -slide) @ fixed[-1]
     return [*tokens, *format_displacement(last)]
 
@@ -413,7 +530,7 @@ def _robot_from_kinematics(path: str | Path, name: str) -> ImportedRobot:
     notes = [f"read: {', '.join(understood)}"]
     if has_digest:
         notes.append("not used: hash")
-    notes += _LACKS
+    notes += [_NO_MASSES, _NO_LIMITS]
     notes.append(
         "base axes are the controller's (base, not base_link, which is turned half round)"
     )

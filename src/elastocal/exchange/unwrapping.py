@@ -52,7 +52,7 @@ def unwrap_into_limits(
             angles[:, joint] += _TURN_RAD * turns
             notes.append(
                 f"{header!r} counts a turn whatever its limits:"
-                f" {format_integer(np.count_nonzero(turns))} of {len(turns)} angles"
+                f" {format_integer(int(np.count_nonzero(turns)))} of {len(turns)} angles"
                 " became another by a turn, within the limits"
             )
     return angles, notes

@@ -55,6 +55,9 @@ if TYPE_CHECKING:
 # reach 4.7 m, and their lengths, with the column, sum to 7 m. Lengths of any arm in
 # centimetres, inches or millimetres exceed the bound.
 LONGEST_REACH_M = 10.0
+# Upper bound on the limits of a prismatic joint: tracks of robots are up to some tens of
+# metres long, and a shorter one in millimetres has larger numbers.
+_LONGEST_TRACK_M = 100.0
 # Lower bound on gravity, m/s²; the microgravity of an orbit is some 1e-5 m/s².
 _LEAST_GRAVITY = 1e-6
 
@@ -164,7 +167,7 @@ def parse_joint_limits(
     ------
     InputError
         If there are too few or too many limits, a lower limit is not below the upper
-        one, or a prismatic joint has no limits.
+        one, or a prismatic joint has no limits or some in millimetres.
     """
     limits = _get_joint_entries(document, "joint_limits_deg", chain.coordinates, source)
     if limits is None:
@@ -174,9 +177,12 @@ def parse_joint_limits(
             raise InputError(source, "joint_limits_deg", track, allowed)
         limits = (UNLIMITED_DEG,) * chain.coordinates
     for joint, (low, high) in enumerate(limits):
+        key = f"joint_limits_deg[{joint}]"
         if low >= high:
-            key = f"joint_limits_deg[{joint}]"
             raise InputError(source, key, str([low, high]), "[lower, upper]")
+        if chain.prismatic[joint] and max(-low, high) > _LONGEST_TRACK_M:
+            allowed = f"metres (not millimetres), {_LONGEST_TRACK_M:g} m at most"
+            raise InputError(source, key, str([low, high]), allowed)
     return np.array(limits, float) * _units(chain)[:, None]
 
 
