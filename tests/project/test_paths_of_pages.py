@@ -109,6 +109,14 @@ def test_the_first_screen_has_the_claim_a_picture_the_figures_and_four_commands(
         assert phrase in screen
 
 
-def test_the_six_steps_of_the_readme_are_in_their_order():
+def test_the_seven_steps_of_the_readme_are_in_their_order():
     steps = re.findall(r"^\d\. \*\*(\w+)\*\*", README, re.MULTILINE)
-    assert steps == ["Plan", "Measure", "Check", "Diagnose", "Correct", "Certificate"]
+    assert steps == [
+        "Plan",
+        "Measure",
+        "Check",
+        "Diagnose",
+        "Correct",
+        "Certificate",
+        "Verify",
+    ]
