@@ -116,6 +116,7 @@ clean:
 
 # A file of its own: the interpreter in the environment is a link to an old one, which make would take for out of date for ever.
 .venv/made: requirements/install.lock
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "elastocal needs Python 3.11 or later, and this is Python %d.%d: make PYTHON=python3.11 paper" % sys.version_info[:2])'
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install -q --require-hashes -r requirements/install.lock
 	touch $@

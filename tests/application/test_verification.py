@@ -160,6 +160,17 @@ def test_the_error_of_the_robot_is_below_its_bound_in_95_percent_of_cases(
     assert np.mean(covered) > 0.92
 
 
+def test_errors_smaller_than_the_noise_do_not_prove_a_perfect_robot():
+    """A bound of nothing would be certain; noise that is overstated is not subtracted."""
+    stream = np.random.default_rng(4)
+    sensor_m = np.full(COUNT, NOISE_M)
+    for share in (0.9, 0.5):
+        errors = draw_errors(stream, 0.0, share * NOISE_M)
+        drawn = draw_measured_rms(errors, np.arange(COUNT), sensor_m, 0)
+        assert errors.compute_rms_without_noise_m(sensor_m) == 0.0
+        assert np.quantile(drawn, 0.95) > 0.2 * NOISE_M
+
+
 def test_an_uncertain_noise_widens_the_error_of_the_robot():
     errors = draw_errors(np.random.default_rng(2), 3e-5)
     arguments = errors, np.arange(COUNT), np.full(COUNT, NOISE_M)

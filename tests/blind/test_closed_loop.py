@@ -108,6 +108,9 @@ def test_the_true_error_is_near_the_stated_one_whether_the_base_is_known_or_not(
         # noise. An unknown base once cost millimetres.
         assert 0.5 < row["true_rms_m"] / row["rms_m"] < 1.6
         assert row["rms_m"] < row["rms_bound_m"] < 2.0 * row["rms_m"]
+        # The same robot is measured at its targets: the prediction held.
+        assert row["prediction_held"]
+        assert row["verified_true_rms_m"] < row["verified_bound_m"] < 1e-4
 
 
 def make_accuracy_rows(true_rms_m, decision="pass", verdict="named", frame="base"):
@@ -124,6 +127,10 @@ def make_accuracy_rows(true_rms_m, decision="pass", verdict="named", frame="base
             "worst_m": 5e-5,
             "worst_bound_m": 6e-5,
             "tolerance_m": 4e-5,
+            "prediction_held": np.array(true_rms_m) < 3e-5,
+            "verified_true_rms_m": true_rms_m,
+            "verified_bound_m": 4.5e-5,
+            "verified_decision": "pass",
         }
     )
 
@@ -146,4 +153,9 @@ def test_shares_count_the_cases_that_a_question_concerns_and_have_exact_interval
     false_passes = coverage.loc[("pass that the truth denies", "all")]
     assert (false_passes["cases"], false_passes["hits"]) == (3, 1)
     assert coverage.loc[("fail that the truth denies", "all"), "hits"] == 1
+    assert coverage.loc[("prediction called wrong", "all"), "hits"] == 2
+    as_measured = coverage.loc[("rms below its 95 % bound as measured", "all")]
+    assert (as_measured["cases"], as_measured["hits"]) == (4, 3)
+    false_passes = coverage.loc[("pass as measured that the truth denies", "all")]
+    assert (false_passes["cases"], false_passes["hits"]) == (4, 1)
     assert coverage.loc[("rms below its 95 % bound", "tracker"), "hits"] == 0

@@ -120,3 +120,12 @@ def test_three_reflectors_on_one_flange_are_three_targets_of_a_probe(plan):
     rows_of_target = sheet["target"].value_counts()
     assert set(rows_of_target) == {len(sheet) // 4}
     assert set(rows_of_target.index) == {"A", "B", "C", "6DoF"}
+
+
+@pytest.mark.parametrize("name", ["kuka_nothing_missing", "a{b}"])
+def test_a_folder_that_diagnose_would_refuse_is_refused_before_measuring(
+    refusal, tmp_path, name
+):
+    folder = tmp_path / name
+    message = refusal("plan", ROBOTS / "kuka.yaml", "--folder", folder)
+    assert "allowed" in message and not folder.exists()

@@ -29,12 +29,14 @@ def build_reference_columns(inputs, orders):
     return np.stack(columns, axis=-1)
 
 
-@pytest.mark.parametrize("orders", [1, 4])
-def test_ridge_harmonics_have_the_penalty_of_ridge_regression_in_each_setting(orders):
-    """With more observations than a chunk holds."""
-    inputs, residual = made_inputs(700, seed=1)
+@pytest.mark.parametrize(("orders", "count"), [(1, 700), (4, 700), (8, 9)])
+def test_ridge_harmonics_have_the_penalty_of_ridge_regression_in_each_setting(
+    orders, count
+):
+    """With more observations than a chunk holds, and with fewer rows than columns."""
+    inputs, residual = made_inputs(count, seed=1)
     unseen, _ = made_inputs(30, seed=2)
-    columns = build_reference_columns(inputs, orders).reshape(2100, -1)
+    columns = build_reference_columns(inputs, orders).reshape(3 * count, -1)
     penalty = 0.3
     reference = Ridge(
         alpha=penalty * (columns**2).sum(axis=0).mean(), fit_intercept=False

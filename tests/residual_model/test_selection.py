@@ -311,11 +311,11 @@ def test_noise_and_too_few_configurations_are_not_corrected(count, level):
 def test_the_regression_that_predicts_left_out_poses_best_is_chosen():
     """Two trends are smooth. A jump at an angle is neither smooth nor a harmonic."""
     names = ["extra_trees", "gaussian_process", "ridge_harmonics"]
-    inputs, smooth = made_inputs(70, seed=1)
+    inputs, smooth = made_inputs(150, seed=1)
     jumps = np.where(inputs.joint_angles[:, [0]] > 0.37, 3e-4, -3e-4) * np.where(
         inputs.joint_angles[:, [1]] > -0.2, 1.0, 0.2
     )
-    jumps = jumps + np.random.default_rng(3).normal(0.0, 2e-5, (70, 3))
+    jumps = jumps + np.random.default_rng(3).normal(0.0, 2e-5, (150, 3))
     assert choose_from(names, inputs, smooth).regression == "gaussian_process"
     assert choose_from(names, inputs, jumps).regression == "extra_trees"
 

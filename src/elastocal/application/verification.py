@@ -57,6 +57,9 @@ POWER = 0.8
 # twelve targets, at least three times as many are not fitted.
 FEWEST_PLACED_TARGETS = 12
 _DRAWS = 4000
+# Share of draws that must be possible. A correctly stated noise leaves fewer in one
+# verification in twenty of a robot without any error.
+_FEWEST_POSSIBLE = 0.05
 _SEED = 1
 # Gauss-Newton steps of the placement; each squares the remaining error, and the first
 # placement is off by no more than the offset of the reflector over the workspace.
@@ -125,6 +128,12 @@ class MeasuredErrors:
     def degrees_of_freedom(self) -> int:
         """Number of coordinates less that of the fitted parameters."""
         return self.error.size - self.fitted
+
+    def compute_rms_without_noise_m(self, sensor_m: np.ndarray) -> float:
+        """Compute the RMS error without the noise of the tracker, m; `sensor_m` (N,) is
+        its standard deviation in a coordinate."""
+        by_noise = 3.0 * float((sensor_m**2).mean())
+        return float(np.sqrt(max(self.mean_square - by_noise, 0.0)))
 
     @property
     def mean_square(self) -> float:
@@ -340,6 +349,9 @@ def draw_measured_rms(
 ) -> np.ndarray:
     """Draw RMS errors of the robot at targets like the measured ones, (draws,), m.
 
+    Only draws whose mean square is positive without the noise are possible. If they are
+    too rare, the noise is overstated, and nothing is subtracted.
+
     The uncertainty is that of the tracker's noise and of the number of targets. Errors
     of one configuration are taken as dependent, those of different ones as independent.
     The scatter between few configurations may be small by chance; it counts as at least
@@ -371,7 +383,10 @@ def draw_measured_rms(
     if noise_dof:
         noise_scale = noise_dof / stream.chisquare(noise_dof, _DRAWS)
     mean_square = total * scale - by_noise * noise_scale
-    return np.sqrt(np.maximum(mean_square, 0.0))
+    is_possible = mean_square > 0.0
+    if is_possible.mean() < _FEWEST_POSSIBLE:
+        return np.sqrt(total * scale)
+    return np.sqrt(mean_square[is_possible])
 
 
 def _compute_ratio_variance(errors: MeasuredErrors, configuration: np.ndarray) -> float:

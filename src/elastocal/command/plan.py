@@ -19,6 +19,7 @@ from elastocal.command.terminal import (
     parse_length_m,
     parse_numbers,
     print_answer,
+    refuse_project_name,
 )
 from elastocal.counting import format_count
 from elastocal.errors import InputError, find_text_fault
@@ -197,7 +198,12 @@ def _choose_sensor(
 
 
 def _check_new_folder(folder: Path) -> None:
-    """Refuse a folder that exists."""
+    """Refuse a folder that exists, and one that `diagnose` would refuse after all has
+    been measured."""
+    from elastocal.campaigns.campaign_folder import check_workflow_path
+
+    check_workflow_path(str(folder.resolve()))
+    refuse_project_name(folder.resolve().name, folder)
     from elastocal.io.texts import describe_file_kind
 
     if os.path.lexists(folder):

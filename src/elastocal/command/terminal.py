@@ -259,6 +259,26 @@ def _find_checkout() -> Path | None:
     return None
 
 
+def refuse_project_name(name: str, source: Path) -> None:
+    """Refuse the name of a campaign of this project, which `diagnose` would refuse after
+    all has been measured: an InputError."""
+    import yaml
+
+    from elastocal.campaigns.importers import list_campaigns
+
+    path = find_pipeline() / "config.yaml"
+    if not path.is_file():
+        return
+    config = yaml.safe_load(path.read_text(encoding="utf-8"))
+    if name in list_campaigns(config):
+        raise InputError(
+            source,
+            "campaign",
+            f"{name!r}, a campaign of elastocal",
+            "a name that no campaign of config.yaml has",
+        )
+
+
 def load_diagnosed_campaign(folder: Path) -> DiagnosedCampaign:
     """Load a campaign with the results of its diagnosis, as `load_diagnosed`.
 

@@ -426,8 +426,9 @@ def warn_of_compliances(fitted: Fit) -> list[str]:
     is_far &= np.abs(compliance - nominal) > _NEGATIVE_STD_ERRORS * std_error
     joints = [
         f"joint {joint + 1} {'below ' if is_negative[joint] else ''}"
-        f"{1e6 * compliance[joint]:.3g} ± {1e6 * std_error[joint]:.2g} "
-        f"({reference} {1e6 * nominal[joint]:.3g})"
+        f"{_format_digits(1e6 * compliance[joint], 3)}"
+        f" ± {_format_digits(1e6 * std_error[joint], 2)}"
+        f" ({reference} {_format_digits(1e6 * nominal[joint], 3)})"
         for joint in np.flatnonzero(is_identified & (is_far | is_negative))
     ]
     if not joints:
@@ -448,3 +449,10 @@ def warn_of_computed_positions(campaign: Campaign) -> list[str]:
         " nearer than any robot goes: a controller worked them out of the joint angles;"
         " they are no measurements, and show nothing of the robot"
     ]
+
+
+def _format_digits(value: float, digits: int) -> str:
+    """Format a number with so many significant digits and without an exponent."""
+    return np.format_float_positional(
+        value, precision=digits, fractional=False, trim="-"
+    )

@@ -179,6 +179,7 @@ class _Comparison:
     targets : the targets.
     errors : measured errors.
     sensor_m : (N,) standard deviation of the tracker's noise in a coordinate.
+    subtracted_m : (N,) the same, or 0 if it is only known from the residual of the fit.
     now : predicted errors by the present diagnosis, in the frame of the campaign.
     prediction, remaining : results of the tests.
     measured_rms_m : (draws,) RMS errors of the robot at targets like these.
@@ -188,6 +189,7 @@ class _Comparison:
     targets: CommandedTargets
     errors: MeasuredErrors
     sensor_m: np.ndarray
+    subtracted_m: np.ndarray
     now: ErrorPrediction
     prediction: PredictionTest
     remaining: RemainingError
@@ -214,6 +216,7 @@ def _compare(
         targets,
         errors,
         sensor_m,
+        subtracted_m,
         predict_errors(calibrated, targets.joint_angles, targets.wrench),
         check_prediction(errors, predicted_rms_m, targets.bound_m, sensor_m),
         find_remaining_error(errors, repeated_m, sensor_m),
@@ -256,7 +259,9 @@ def _describe_errors(comparison: _Comparison, accepted_risk: float) -> dict[str,
         "before_rms_m": root_mean_square(targets.before_m),
         "predicted_rms_m": root_mean_square(targets.after_m),
         "measured_rms_m": root_mean_square(distance_m),
-        "robot_rms_m": root_mean_square(measured_rms_m),
+        "robot_rms_m": comparison.errors.compute_rms_without_noise_m(
+            comparison.subtracted_m
+        ),
         "robot_bound_m": float(np.quantile(measured_rms_m, 1.0 - accepted_risk)),
         "accepted_risk": accepted_risk,
         "worst": {

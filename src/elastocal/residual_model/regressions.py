@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 _CHUNK = 500
 # Trees of a forest.
 _TREES = 100
+# A node of fewer observations is not split, as the method's authors suggest for
+# regression.
+_MIN_SAMPLES_SPLIT = 5
 # Penalties of functions of two joints, in mean squares of a column.
 _PENALTIES = np.logspace(-4.0, 2.0, 7)
 # Observations from which the hyperparameters of the process are estimated. A step of
@@ -122,12 +125,20 @@ class Regression:
     settings : hyperparameters among which cross-validation chooses; a single one if the
         regression chooses by itself
     uses_jacobian : whether it needs `Inputs.jacobian`, which takes most of the memory
+    tune : function or None
+        Estimates hyperparameters, by inputs, residuals and seed, that all folds of a
+        cross-validation share: a setting instead of the single one.
+    min_rows : function
+        Fewest observations, by the number of joints, with which the best regression may
+        be this one; a campaign that names it has it with any number.
     """
 
     description: str
     fit: Callable[[Inputs, np.ndarray, Sequence[Setting], int], Iterator[Predictor]]
     settings: Sequence[Setting] = ({},)
     uses_jacobian: bool = False
+    tune: Callable[[Inputs, np.ndarray, int], Setting] | None = None
+    min_rows: Callable[[int], int] = lambda joints: 0
 
 
 @dataclass(frozen=True)
@@ -209,6 +220,41 @@ class _GeometryBlock:
         )
 
 
+@dataclass(frozen=True)
+class _DualRidge:
+    """Ridge regression with fewer rows than columns, along the principal axes of the
+    products of the rows [1]_, so that further penalties cost next to nothing.
+
+    Attributes
+    ----------
+    rows : (R, P) array
+    eigenvalues : (R,) array
+    axes : (R, R) array, eigenvectors
+    projection : (R,) array, the residual along these axes
+
+    References
+    ----------
+    .. [1] Saunders, Gammerman and Vovk, Ridge regression learning algorithm in dual
+       variables, International Conference on Machine Learning 15, 1998.
+    """
+
+    rows: np.ndarray
+    eigenvalues: np.ndarray
+    axes: np.ndarray
+    projection: np.ndarray
+
+    @classmethod
+    def from_rows(cls, rows: np.ndarray, target: np.ndarray) -> _DualRidge:
+        """Diagonalize the products of the rows (R, P), given the residual (R,)."""
+        eigenvalues, axes = np.linalg.eigh(rows @ rows.T)
+        return cls(rows, np.maximum(eigenvalues, 0.0), axes, axes.T @ target)
+
+    def solve(self, penalty: float) -> np.ndarray:
+        """Solve for the coefficients (P,), with a penalty on all of them."""
+        multipliers = self.axes @ (self.projection / (self.eigenvalues + penalty))
+        return self.rows.T @ multipliers
+
+
 def fit_ridge_harmonics(
     inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int
 ) -> Iterator[Predictor]:
@@ -244,22 +290,37 @@ def fit_ridge_harmonics(
         projection += rows.T @ residual[chunk].ravel()
     geometry = _GeometryBlock.from_products(gram[:split, :split], projection[:split])
     cross_gram = geometry.axes.T @ gram[:split, split:]
+
+    # Settings of the same orders follow each other.
+    @lru_cache(maxsize=1)
+    def build_dual(orders: int) -> _DualRidge:
+        chunks = [
+            build_columns(inputs, chunk.start, orders)
+            for chunk in _split_into_chunks(inputs)
+        ]
+        columns = np.concatenate(chunks).reshape(residual.size, -1)
+        return _DualRidge.from_rows(columns, residual.ravel())
+
     for setting in settings:
         # Lower orders come first among the harmonics, so that fewer orders are the first
         # columns.
         orders = setting["orders"]
         end = split + 2 * orders * joints
         harmonic_gram = gram[split:end, split:end]
-        solution = geometry.solve_ridge(
-            cross_gram[:, : end - split],
-            harmonic_gram,
-            projection[split:end],
-            setting["penalty"] * geometry.mean_square(harmonic_gram),
-        )
+        penalty = setting["penalty"] * geometry.mean_square(harmonic_gram)
+        if residual.size < end:
+            coefficients = build_dual(orders).solve(penalty)
+        else:
+            coefficients = geometry.solve_ridge(
+                cross_gram[:, : end - split],
+                harmonic_gram,
+                projection[split:end],
+                penalty,
+            ).coefficients
 
         def mean(
             queries: Inputs,
-            coefficients: np.ndarray = solution.coefficients,
+            coefficients: np.ndarray = coefficients,
             orders: int = orders,
         ) -> np.ndarray:
             return _concatenate(
@@ -354,6 +415,15 @@ def fit_extra_trees(
     yield Predictor(mean)
 
 
+def count_rows_of_a_tree(joints: int) -> int:
+    """Count the observations with which a tree can split once along each joint.
+
+    With fewer, its boxes average over most of the workspace, as smoother regressions do
+    at less cost.
+    """
+    return int(_MIN_SAMPLES_SPLIT * 2**joints)
+
+
 @dataclass(frozen=True)
 class _Hyperparameters:
     """Variance of a Gaussian process, length of each scaled input (d,), and variance of
@@ -431,33 +501,95 @@ def fit_gaussian_process(
     .. [1] Rasmussen and Williams, Gaussian Processes for Machine Learning, chapters 2,
        4, 5 and 8, MIT Press, 2006.
     """
-    columns = inputs.columns
-    varying = np.flatnonzero(columns.std(axis=0) > _CONSTANT_STD)
-    center = columns[:, varying].mean(axis=0)
-    spread = columns[:, varying].std(axis=0)
-    offset = residual.mean(axis=0)
-    size = residual.std(axis=0)
-    size = np.where(size > 0.0, size, 1.0)
-
-    def scale(queries: Inputs) -> np.ndarray:
-        return (queries.columns[:, varying] - center) / spread
-
+    (setting,) = settings
+    scaling = _Scaling.from_observations(inputs, residual)
+    stream = np.random.default_rng(seed)
+    chosen = setting or _tune_process(scaling, inputs, residual, stream)
+    hyperparameters = _Hyperparameters(
+        chosen["variance"], chosen["lengths"][scaling.varying], chosen["noise"]
+    )
     process = _fit_process(
-        scale(inputs), (residual - offset) / size, np.random.default_rng(seed)
+        scaling.scale(inputs), scaling.standardize(residual), hyperparameters, stream
     )
     yield Predictor(
-        lambda queries: process.mean(scale(queries)) * size + offset,
-        lambda queries: process.std(scale(queries))[:, None] * size,
+        lambda queries: (
+            process.mean(scaling.scale(queries)) * scaling.size + scaling.offset
+        ),
+        lambda queries: process.std(scaling.scale(queries))[:, None] * scaling.size,
     )
+
+
+def tune_gaussian_process(inputs: Inputs, residual: np.ndarray, seed: int) -> Setting:
+    """Estimate the hyperparameters of `fit_gaussian_process`, as a setting of it."""
+    scaling = _Scaling.from_observations(inputs, residual)
+    return _tune_process(scaling, inputs, residual, np.random.default_rng(seed))
+
+
+@dataclass(frozen=True)
+class _Scaling:
+    """Scale of the inputs and residuals of a process.
+
+    Attributes
+    ----------
+    varying : (d,) int array, columns of the inputs that vary over the observations
+    center, spread : (d,) arrays, mean and standard deviation of these columns
+    offset, size : (3,) arrays, mean and standard deviation of the residuals, m
+    """
+
+    varying: np.ndarray
+    center: np.ndarray
+    spread: np.ndarray
+    offset: np.ndarray
+    size: np.ndarray
+
+    @classmethod
+    def from_observations(cls, inputs: Inputs, residual: np.ndarray) -> _Scaling:
+        """Scale by M observations with residuals (M, 3), m."""
+        columns = inputs.columns
+        varying = np.flatnonzero(columns.std(axis=0) > _CONSTANT_STD)
+        size = residual.std(axis=0)
+        return cls(
+            varying,
+            columns[:, varying].mean(axis=0),
+            columns[:, varying].std(axis=0),
+            residual.mean(axis=0),
+            np.where(size > 0.0, size, 1.0),
+        )
+
+    def scale(self, queries: Inputs) -> np.ndarray:
+        """Scale the varying inputs, (M, d) array."""
+        return (queries.columns[:, self.varying] - self.center) / self.spread
+
+    def standardize(self, residual: np.ndarray) -> np.ndarray:
+        """Standardize residuals (M, 3), m."""
+        return (residual - self.offset) / self.size
+
+
+def _tune_process(
+    scaling: _Scaling,
+    inputs: Inputs,
+    residual: np.ndarray,
+    stream: np.random.Generator,
+) -> Setting:
+    """Estimate the hyperparameters by some of the observations. An input that does not
+    vary there has an infinite length, which is no influence."""
+    subset = np.sort(stream.permutation(len(inputs))[:_MAX_FOR_HYPERPARAMETERS])
+    optimum = _maximize_likelihood(
+        scaling.scale(inputs.select(subset)), scaling.standardize(residual[subset])
+    )
+    lengths = np.full(inputs.columns.shape[1], np.inf)
+    lengths[scaling.varying] = optimum.lengths
+    return {"variance": optimum.variance, "lengths": lengths, "noise": optimum.noise}
 
 
 def _fit_process(
-    inputs: np.ndarray, residual: np.ndarray, stream: np.random.Generator
+    inputs: np.ndarray,
+    residual: np.ndarray,
+    hyperparameters: _Hyperparameters,
+    stream: np.random.Generator,
 ) -> _GaussianProcess:
     """Fit a process to scaled inputs (M, d) and standardized residuals (M, 3)."""
-    subset = np.sort(stream.permutation(len(inputs))[:_MAX_FOR_HYPERPARAMETERS])
     inducing = np.sort(stream.permutation(len(inputs))[:_MAX_INDUCING_POINTS])
-    hyperparameters = _maximize_likelihood(inputs[subset], residual[subset])
     variance = hyperparameters.variance
     inputs = inputs / hyperparameters.lengths
     points = inputs[inducing]
@@ -482,9 +614,12 @@ REGRESSIONS = {
     "extra_trees": Regression(
         "forest of extremely randomized trees",
         fit_extra_trees,
-        ({"min_samples_split": 5, "max_features": 1.0},),
+        ({"min_samples_split": _MIN_SAMPLES_SPLIT, "max_features": 1.0},),
+        min_rows=count_rows_of_a_tree,
     ),
-    "gaussian_process": Regression("Gaussian process", fit_gaussian_process),
+    "gaussian_process": Regression(
+        "Gaussian process", fit_gaussian_process, tune=tune_gaussian_process
+    ),
     "ridge_harmonics": Regression(
         "ridge regression on harmonics of the joint angles",
         fit_ridge_harmonics,

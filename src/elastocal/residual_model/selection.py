@@ -54,7 +54,7 @@ from elastocal.verdict import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.least_squares import Fit
@@ -464,9 +464,14 @@ def _choose_on_training(
         compute_position_residuals(fitted.model, fitted.estimate, sample),
         np.stack(residual_without),
     )
-    names = [
-        name for name in list_regressions() if plan.regression in (name, BEST_REMAINDER)
-    ]
+    names = [plan.regression]
+    if plan.regression == BEST_REMAINDER:
+        joints = states.joint_angles.shape[1]
+        names = [
+            name
+            for name, regression in list_regressions().items()
+            if len(sample) >= regression.min_rows(joints)
+        ]
     inputs = build_inputs(fitted.model, fitted.estimate, sample)
     return choose_regression(names, inputs, training, plan.seed)
 
@@ -494,12 +499,17 @@ def choose_regression(
     configurations = int(folds.configuration.max()) + 1
     if configurations < MIN_CONFIGURATIONS:
         return nothing
+    settings = {
+        name: _list_settings(name, inputs, folds.residual, seed) for name in names
+    }
+    # The predictions that decide, and the last fit, estimate hyperparameters anew, by
+    # nothing but what they are fitted to.
     candidates = [
         (name, setting)
-        for name in names
+        for name in settings
         for setting in list_regressions()[name].settings
     ]
-    products = _cross_validate(names, inputs, folds, seed)
+    products = _cross_validate(settings, inputs, folds, seed)
     # Residuals of the model fitted without the fold of each observation.
     residual = folds.residual_without[folds.fold, np.arange(len(folds.fold))]
     predicted = np.zeros_like(residual)
@@ -537,16 +547,32 @@ def choose_regression(
     )
 
 
+def _list_settings(
+    name: str, inputs: Inputs, residual: np.ndarray, seed: int
+) -> Sequence[Setting]:
+    """List the settings of a regression among which cross-validation chooses.
+
+    Hyperparameters that a regression estimates are estimated once for all folds of this
+    choice: they are few, and the search for them takes most of the time.
+    """
+    regression = list_regressions()[name]
+    if regression.tune is None:
+        return regression.settings
+    return [regression.tune(inputs, residual, seed)]
+
+
 def _cross_validate(
-    names: Sequence[str], inputs: Inputs, folds: TrainingFolds, seed: int
+    settings: Mapping[str, Sequence[Setting]],
+    inputs: Inputs,
+    folds: TrainingFolds,
+    seed: int,
 ) -> np.ndarray:
     """Predict each fold by candidates that are fitted without it and one other fold.
 
     Returns a (K, K, candidates, 2) array, m²: products of the predictions with the
     residuals and with themselves, by the outer fold and by the predicted fold.
     """
-    regressions = [list_regressions()[name] for name in names]
-    candidates = sum(len(regression.settings) for regression in regressions)
+    candidates = sum(map(len, settings.values()))
     members = [folds.fold == number for number in range(folds.count)]
     inputs_by_fold = [inputs.select(mask) for mask in members]
     products = np.zeros((folds.count, folds.count, candidates, 2))
@@ -558,9 +584,9 @@ def _cross_validate(
         training_inputs = inputs.select(training)
         predictors = (
             predictor
-            for regression in regressions
-            for predictor in regression.fit(
-                training_inputs, residual[training], regression.settings, seed
+            for name in settings
+            for predictor in list_regressions()[name].fit(
+                training_inputs, residual[training], settings[name], seed
             )
         )
         for number, predictor in enumerate(predictors):

@@ -25,12 +25,21 @@ from elastocal.application.accuracy import predict_errors
 from elastocal.application.calibrated import calibrate_by_fit, compute_nominal_poses
 from elastocal.application.compensation import find_joint_targets
 from elastocal.application.frames import (
+    BASE,
     ROBOT,
     Scope,
     compute_placement_columns,
     fit_placement,
     select_free_parameters,
 )
+from elastocal.application.verification import (
+    CommandedTargets,
+    check_prediction,
+    compute_measured_errors,
+    draw_measured_rms,
+    predict_over_targets,
+)
+from elastocal.campaigns.holdout import number_configurations
 from elastocal.campaigns.reading import read_robot
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import apply_regression, remove_gross_errors
@@ -454,8 +463,8 @@ def compare_stated_accuracy(
     )
     angles = commands.joint_angles
     corrected = commands.status == OK
-    errors = move_robot(robot.plant, angles, wanted.wrench, seed + 1)[0]
-    errors = errors - wanted.position
+    moved = _move_and_measure(robot, angles, seed)
+    errors = moved.position - wanted.position
     if frame != "base":
         random_poses = corrected & (wanted.part != MILLING)
         errors = _subtract_placement(wanted, errors, random_poses)
@@ -485,8 +494,88 @@ def compare_stated_accuracy(
                     prediction.rms_m, float(tolerance_m), _RISK
                 ).decision,
             }
+            | _verify(calibrated, wanted, moved, chosen, float(tolerance_m))
         )
     return rows
+
+
+@dataclass(frozen=True)
+class _Moved:
+    """Where the simulated robot came to rest at N commands.
+
+    Attributes
+    ----------
+    angles : (N, n) array
+        Commands, rad.
+    position, measured : (N, 3) arrays
+        Reached and measured positions, m, base axes.
+    """
+
+    angles: np.ndarray
+    position: np.ndarray
+    measured: np.ndarray
+
+
+def _move_and_measure(robot: DiagnosedRobot, angles: np.ndarray, seed: int) -> _Moved:
+    """Command the robot, with new random errors, and measure it."""
+    position, rotation = move_robot(robot.plant, angles, robot.wanted.wrench, seed + 1)
+    stream = open_simulation_stream(seed, "verification")
+    measured, _ = robot.plant.tracker.read(position[:, None], rotation[:, None], stream)
+    return _Moved(angles, position, measured[:, 0])
+
+
+def _verify(
+    calibrated: CalibratedRobot,
+    wanted: WantedPoses,
+    moved: _Moved,
+    chosen: np.ndarray,
+    tolerance_m: float,
+) -> dict[str, Any]:
+    """Verify a corrected robot as `elastocal verify` does, and state its true error in
+    the same frame; `chosen` are the poses that are verified, (N,) of bool."""
+    targets = _collect_targets(wanted, moved, chosen)
+    reached = replace(targets, measured=moved.position[chosen])
+    base_known = calibrated.scope.frame == BASE
+    errors, true_errors = (
+        compute_measured_errors(compared, (0.0, 0.0, 0.0), base_known=base_known)
+        for compared in (targets, reached)
+    )
+    sensor_m = np.full(len(targets), calibrated.noise.position_m)
+    predicted_rms_m, _ = predict_over_targets(calibrated, targets, errors.free)
+    test = check_prediction(errors, predicted_rms_m, targets.bound_m, sensor_m)
+    measured_rms_m = draw_measured_rms(
+        errors, targets.configuration, sensor_m, calibrated.noise.degrees_of_freedom
+    )
+    decision = decide_conformity(measured_rms_m, tolerance_m, _RISK)
+    return {
+        "prediction_held": test.held,
+        "verified_true_rms_m": float(np.sqrt(true_errors.mean_square)),
+        "verified_bound_m": float(np.quantile(measured_rms_m, 1.0 - _RISK)),
+        "verified_decision": decision.decision,
+    }
+
+
+def _collect_targets(
+    wanted: WantedPoses, moved: _Moved, chosen: np.ndarray
+) -> CommandedTargets:
+    """Collect some measured targets; errors that were stated for single ones are not
+    compared."""
+    angles = moved.angles[chosen]
+    count = len(angles)
+    not_stated = np.full(count, np.nan)
+    return CommandedTargets(
+        np.arange(1, count + 1),
+        angles,
+        wanted.wrench[chosen],
+        wanted.position[chosen],
+        wanted.rotation[chosen],
+        not_stated,
+        not_stated,
+        not_stated,
+        moved.measured[chosen],
+        np.ones(count, int),
+        number_configurations(angles, np.arange(count)),
+    )
 
 
 def _subtract_placement(
@@ -684,6 +773,15 @@ def compute_coverage(rows: pd.DataFrame) -> pd.DataFrame:
         ),
         "pass that the truth denies": (rows["decision"] == "pass", ~within),
         "fail that the truth denies": (rows["decision"] == "fail", within),
+        "prediction called wrong": (all_rows, ~rows["prediction_held"].astype(bool)),
+        "rms below its 95 % bound as measured": (
+            all_rows,
+            rows["verified_true_rms_m"] <= rows["verified_bound_m"],
+        ),
+        "pass as measured that the truth denies": (
+            rows["verified_decision"] == "pass",
+            rows["verified_true_rms_m"] > rows["tolerance_m"],
+        ),
     }
     counts = []
     for frame, part, verdict in product(
