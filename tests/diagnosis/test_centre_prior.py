@@ -8,12 +8,14 @@ from planted import two_loads_a_pose
 from synthetic import NOISE, add_noise, make_estimate, make_model, observe_exactly
 
 from elastocal.campaigns.campaign import Target
+from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.centre_prior import choose_centre_prior
 from elastocal.diagnosis.fitted_subset import FittedSubset
+from elastocal.diagnosis.refit import reset_declared_masses
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import fit_model
-from elastocal.fitting.model import Case
+from elastocal.fitting.model import Case, get_mass_corrections
 from elastocal.mechanics.robot import Mass
 
 MASSES = (
@@ -77,3 +79,28 @@ def test_the_prior_is_the_one_that_the_measurements_make_more_probable(
     if not stays_wide:
         stated = 28.0 * np.linalg.norm(MASSES[0].centre_m)
         assert weight.parameters[1].prior_std == pytest.approx(stated)
+
+
+def test_a_law_not_linear_in_the_load_is_evaluated_at_fitted_and_at_declared_masses(
+    kuka,
+):
+    """The columns differ where the errors of the masses change the torque."""
+    subset = fitted_subset(replace(kuka, masses=MASSES), deviation=2.0)
+    candidate = subset.case.candidates["lost_motion@2"]
+    design = build_candidate_design(
+        subset.declared, subset.search_sample, [candidate], Settings()
+    )
+    variants = [term for term in design.terms if term.mechanism == "lost_motion"]
+    fitted, declared = (
+        [term for term in variants if term.at_declared_masses is at_declared]
+        for at_declared in (False, True)
+    )
+    assert len(fitted) == len(declared) > 0
+    columns = design.rows.candidates.dense()
+    for term, other in zip(fitted, declared, strict=True):
+        assert term.shapes == other.shapes
+        change = columns[..., term.columns] - columns[..., other.columns]
+        assert np.abs(change).max() > 0.01 * np.abs(columns[..., term.columns]).max()
+    start = reset_declared_masses(subset.declared)
+    assert get_mass_corrections(subset.declared.model, subset.declared.estimate).any()
+    assert not get_mass_corrections(start.model, start.estimate).any()

@@ -12,7 +12,11 @@ from scipy.special import chdtri
 
 from elastocal.diagnosis.discrepancy import Discrepancy, build_discrepancies
 from elastocal.diagnosis.evidence import TermBlock, list_pose_errors
-from elastocal.diagnosis.hypotheses import ModelTerm, build_terms
+from elastocal.diagnosis.hypotheses import (
+    ModelTerm,
+    build_terms,
+    list_mass_evaluations,
+)
 from elastocal.diagnosis.search import SearchProblem, select_pose_errors
 from elastocal.diagnosis.statistics import (
     CrossProducts,
@@ -21,6 +25,7 @@ from elastocal.diagnosis.statistics import (
     compute_cross_products,
     compute_statistics,
 )
+from elastocal.effects.conditions import replace_springs
 from elastocal.errors import InputError
 from elastocal.fitting.linearization import FactoredSensitivities, linearize
 from elastocal.fitting.model import find_nonlinear_parameters, get_parameter_values
@@ -198,12 +203,21 @@ class CandidateDesign:
     def terms(self) -> tuple[ModelTerm, ...]:
         """Terms of candidates, discrepancies and gross errors, in the order of their
         columns."""
-        terms = build_terms(self.tried.values(), self.discrepancies, self.settings)
+        terms = build_terms(
+            self.tried.values(),
+            self.discrepancies,
+            self.settings,
+            has_masses=self._has_masses,
+        )
         if self.gross_errors:
             first_column = sum(len(term.columns) for term in terms)
             scales = len(self.settings.scales)
             terms += self.gross_errors.build_terms(first_column, scales)
         return terms
+
+    @property
+    def _has_masses(self) -> bool:
+        return bool(self.reference_fit.model.sites.masses)
 
     @property
     def priors(self) -> tuple[np.ndarray, np.ndarray]:
@@ -230,12 +244,21 @@ class CandidateDesign:
     def rows(self) -> WhitenedRows:
         """Whitened rows with the candidate columns in the order of the terms."""
         rows, conditions = self.whitened.rows_and_conditions
-        displacements = [
-            column
-            for candidate, shape_values in self.tried.values()
-            for shapes in shape_values
-            for column in candidate.displacement(conditions, *shapes)
-        ]
+        by_masses = {False: conditions}
+        if self._has_masses:
+            no_corrections = np.zeros_like(conditions.mass_corrections)
+            by_masses[True] = replace_springs(
+                conditions, conditions.compliance, no_corrections
+            )
+        displacements = []
+        for candidate, shape_values in self.tried.values():
+            for at_declared_masses in list_mass_evaluations(
+                candidate, has_masses=self._has_masses
+            ):
+                for shapes in shape_values:
+                    displacements += candidate.displacement(
+                        by_masses[at_declared_masses], *shapes
+                    )
         for discrepancy in self.discrepancies:
             displacements += discrepancy.displacement(conditions)
         jacobian = rows.candidates.jacobian
@@ -453,9 +476,11 @@ def refine_shapes(
             and candidate.key not in refined
         ):
             values = sorted(
-                variant.shapes[0]
-                for variant in terms
-                if variant.candidate and variant.candidate.key == candidate.key
+                {
+                    variant.shapes[0]
+                    for variant in terms
+                    if variant.candidate and variant.candidate.key == candidate.key
+                }
             )
             values = _refine_values(candidate.shapes[0], values, term.shapes[0])
             refined[candidate.key] = candidate, [(value,) for value in values]

@@ -571,18 +571,38 @@ def _is_linear(start: _SearchRound, evidence: Evidence, settings: Settings) -> b
     The noise must not be far above the one by which the problem was whitened, because
     plausible sizes are in units of that noise. Then it is enough that little or nothing
     is missing, that the same effects were named before, or that the exact fit keeps
-    what the linear problem promised.
+    what the linear problem promised. Laws that are not linear in the torque are compared
+    about a model that has the leading one, because its fit moves masses and springs.
     """
     largest_m = settings.relinearize_noise * start.reference.noise.position_m
     named = evidence.conclusion.best.named
     if evidence.fitted.noise.position_m > largest_m:
         return False
-    if evidence.alarm.statistic < settings.relinearize_above:
-        return True
     if named in ((), start.named):
+        return True
+    if _depends_on_torque(evidence):
+        return False
+    if evidence.alarm.statistic < settings.relinearize_above:
         return True
     misfit = abs(refit.compute_reduced_chi_square(evidence.fitted) - 1.0)
     return misfit < settings.linear_misfit
+
+
+def _depends_on_torque(evidence: Evidence) -> bool:
+    """Whether one of the two most probable sets of mechanisms has a law that is not
+    linear in the load."""
+    leading = sorted(
+        evidence.conclusion.hypotheses,
+        key=lambda hypothesis: -hypothesis.probability,
+    )[:2]
+    terms = evidence.design.problem.terms
+    return any(
+        candidate is not None and candidate.nonlinear_in_load
+        for hypothesis in leading
+        if hypothesis.mechanisms
+        for index in evidence.posterior.models[hypothesis.model].term_indices
+        for candidate in [terms[index].candidate]
+    )
 
 
 def _search(context: _Context, subset: FittedSubset, start: _SearchRound) -> Evidence:
@@ -620,8 +640,14 @@ def _search(context: _Context, subset: FittedSubset, start: _SearchRound) -> Evi
         start.reference.noise,
         subset.declared.noise,
     )
+    declared = subset.declared
+    if any(
+        design.problem.terms[index].at_declared_masses
+        for index in evidence.named_model.term_indices
+    ):
+        declared = refit.reset_declared_masses(declared)
     fitted = refit.fit_selected_effects(
-        subset.declared,
+        declared,
         subset.search_sample,
         noise,
         refit.select_effects(design, evidence.named_model),

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -48,6 +48,8 @@ class ModelTerm:
     signs : (d,) int, sign that physics gives each parameter, 0 if it may have either
     log_prior : logarithm of its share among the variants at its location
     discrepancy : None for a candidate
+    at_declared_masses : whether a law that is not linear in the load is evaluated at the
+        masses of the robot file instead of those that were fitted
     smallest : index in the grid of scales of the smallest one that the measurements
         could show
     largest : index of the largest one that the term may have; -1 for the last
@@ -64,6 +66,7 @@ class ModelTerm:
     discrepancy: Discrepancy | None = None
     smallest: int = 0
     largest: int = -1
+    at_declared_masses: bool = False
 
     @property
     def slot(self) -> tuple[str, tuple[int | str, ...], str]:
@@ -145,6 +148,8 @@ def build_terms(
     shape_values: Iterable[tuple[Candidate, Sequence[tuple[float, ...]]]],
     discrepancies: Sequence[Discrepancy],
     settings: Settings,
+    *,
+    has_masses: bool = False,
 ) -> tuple[ModelTerm, ...]:
     """Build the terms of candidates and discrepancies, in the order of their columns.
 
@@ -153,6 +158,7 @@ def build_terms(
     shape_values : candidates, each with the values of its shapes that are tried
     discrepancies : discrepancies
     settings : settings of the diagnosis
+    has_masses : whether the robot file states masses
     """
     shape_values = list(shape_values)
     terms: list[ModelTerm] = []
@@ -162,10 +168,16 @@ def build_terms(
     )
     for candidate, values in shape_values:
         count = variants[candidate.effect, candidate.location]
-        terms += _build_candidate_terms(
-            candidate, values, count, first_column, settings
-        )
-        first_column += len(values) * len(candidate.parameters)
+        evaluations = list_mass_evaluations(candidate, has_masses=has_masses)
+        for at_declared_masses in evaluations:
+            of_candidate = _build_candidate_terms(
+                candidate, values, count * len(evaluations), first_column, settings
+            )
+            terms += [
+                replace(term, at_declared_masses=at_declared_masses)
+                for term in of_candidate
+            ]
+            first_column += len(values) * len(candidate.parameters)
     kinds = Counter(discrepancy.kind for discrepancy in discrepancies)
     for discrepancy in discrepancies:
         # All kinds are equally likely, and so are all locations of a kind.
@@ -189,6 +201,18 @@ def build_terms(
     return tuple(terms)
 
 
+def list_mass_evaluations(
+    candidate: Candidate, *, has_masses: bool
+) -> tuple[bool, ...]:
+    """List at which masses a candidate is evaluated: fitted (False) or declared (True).
+
+    A law that is not linear in the load depends on the torque, and a fit without the
+    effect distorts the masses until they explain a part of it. The masses of the robot
+    file have no such error, but their own; so both are equally probable beforehand.
+    """
+    return (False, True) if has_masses and candidate.nonlinear_in_load else (False,)
+
+
 def _build_candidate_terms(
     candidate: Candidate,
     shape_values: Sequence[tuple[float, ...]],
@@ -198,7 +222,8 @@ def _build_candidate_terms(
 ) -> list[ModelTerm]:
     """Terms of one candidate, one for each value of its shapes.
 
-    `variants`: number of candidates that share the probability of the location.
+    `variants`: number of candidates and evaluations that share the probability of the
+    location.
     """
     parameters = candidate.parameters
     sizes = np.array(

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.effects.gravity import DECLARED_WEIGHT
 from elastocal.fitting.least_squares import CONVERGENCE_TOLERANCE, fit_model
 from elastocal.fitting.model import get_parameter_values
 from elastocal.fitting.noise import set_prior_std
@@ -54,6 +55,18 @@ def select_effects(design: CandidateDesign, model: ScoredModel) -> SelectedEffec
         effect = set_prior_std(term.candidate, size * term.sizes)
         effects.append((effect, np.array(term.shapes, float)))
     return tuple(effects)
+
+
+def reset_declared_masses(fitted: Fit) -> Fit:
+    """Set the errors of the declared masses to zero in the estimate of a fit, where a
+    fit with a law that is not linear in the load starts."""
+    coefficients = tuple(
+        np.zeros_like(values) if effect.effect == DECLARED_WEIGHT else values
+        for effect, values in zip(
+            fitted.model.effects, fitted.estimate.coefficients, strict=True
+        )
+    )
+    return replace(fitted, estimate=replace(fitted.estimate, coefficients=coefficients))
 
 
 def fit_selected_effects(

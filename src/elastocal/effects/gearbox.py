@@ -79,7 +79,13 @@ def stiffening(entry: Effect, sites: Sites, joint: int, detail: str) -> Candidat
         return [load - _TORQUE_AT_REST[detail](load, torque)]
 
     yield entry.of_joint(
-        joint, beyond, turns, LOADED_JOINTS, shapes=(meeting,), detail=detail
+        joint,
+        beyond,
+        turns,
+        LOADED_JOINTS,
+        shapes=(meeting,),
+        detail=detail,
+        nonlinear_in_load=True,
     )
 
 
@@ -107,6 +113,7 @@ def lost_motion(entry: Effect, sites: Sites, joint: int) -> Candidates:
         lambda conditions, torque: [np.tanh(conditions.total[:, joint] / torque)],
         LOADED_JOINTS,
         shapes=(torque,),
+        nonlinear_in_load=True,
     )
 
 

@@ -182,6 +182,8 @@ class Candidate:
     fixed : whether the displacement per unit depends on the joint angles alone, neither
         on loads or compliances nor on the deflected pose, so that no step of a fit
         changes it.
+    nonlinear_in_load : whether the law is no linear function of the load, so that it
+        depends on where the load changes its sign or reaches a threshold.
     """
 
     effect: str
@@ -197,6 +199,7 @@ class Candidate:
     of_setup: bool = False
     turning: tuple[int, ...] = ()
     fixed: bool = False
+    nonlinear_in_load: bool = False
 
     @property
     def location(self) -> tuple[int | str, ...]:
