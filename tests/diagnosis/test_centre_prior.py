@@ -91,10 +91,8 @@ def test_a_law_not_linear_in_the_load_is_evaluated_at_fitted_and_at_declared_mas
         subset.declared, subset.search_sample, [candidate], Settings()
     )
     variants = [term for term in design.terms if term.mechanism == "lost_motion"]
-    fitted, declared = (
-        [term for term in variants if term.at_declared_masses is at_declared]
-        for at_declared in (False, True)
-    )
+    fitted = [term for term in variants if not term.at_declared_masses]
+    declared = [term for term in variants if term.at_declared_masses]
     assert len(fitted) == len(declared) > 0
     columns = design.rows.candidates.dense()
     for term, other in zip(fitted, declared, strict=True):

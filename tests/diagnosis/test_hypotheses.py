@@ -102,12 +102,11 @@ def test_laws_not_linear_in_the_load_have_a_term_at_the_masses_of_the_file_too(
     catalogue,
 ):
     """Both are equally probable beforehand, and share what one would have alone."""
-    gears = [
-        candidate
-        for candidate in catalogue
-        if candidate.key in ("lost_motion@2", "joint_offset@2")
-    ]
-    values = [(gear, [tuple(shape.start for shape in gear.shapes)]) for gear in gears]
+    values = []
+    for candidate in catalogue:
+        if candidate.key in ("lost_motion@2", "joint_offset@2"):
+            start = tuple(shape.start for shape in candidate.shapes)
+            values.append((candidate, [start]))
     alone = build_terms(values, [], SETTINGS)
     terms = build_terms(values, [], SETTINGS, has_masses=True)
     evaluated = [(term.mechanism, term.at_declared_masses) for term in terms]
@@ -118,13 +117,13 @@ def test_laws_not_linear_in_the_load_have_a_term_at_the_masses_of_the_file_too(
     ]
     columns = np.concatenate([term.columns for term in terms])
     np.testing.assert_array_equal(columns, np.arange(3))
-    shares = {
-        name: sum(np.exp(term.log_prior) for term in listed if term.mechanism == name)
-        for listed in (terms,)
-        for name in ("joint_offset", "lost_motion")
-    }
     for term in alone:
-        assert shares[term.mechanism] == pytest.approx(np.exp(term.log_prior))
+        shares = [
+            np.exp(evaluated_term.log_prior)
+            for evaluated_term in terms
+            if evaluated_term.mechanism == term.mechanism
+        ]
+        assert sum(shares) == pytest.approx(np.exp(term.log_prior))
 
 
 def test_terms_share_out_all_columns(terms):

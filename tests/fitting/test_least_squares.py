@@ -33,6 +33,7 @@ from synthetic import (
 )
 
 from elastocal.campaigns.campaign import Target
+from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.elastic import joint_compliance
 from elastocal.fitting import least_squares
 from elastocal.fitting.least_squares import (
@@ -47,6 +48,7 @@ from elastocal.fitting.model import Model, get_joint_compliances
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.normal_equations import LeastSquaresProblem
 from elastocal.fitting.observations import Observations
+from elastocal.mechanics.robot import Mass
 
 MODULE = "elastocal.fitting.least_squares"
 
@@ -685,3 +687,21 @@ def test_springs_stay_at_zero_where_loads_of_the_wrong_sign_would_make_them_nega
     compliance = get_joint_compliances(model, fitted.estimate)
     assert fitted.converged and (compliance >= 0).all()
     assert (compute_negative_compliances(fitted) > 3).sum() >= 3
+
+
+def test_a_joint_without_any_compliance_still_bears_declared_masses(kuka):
+    """A fit may start where physics keeps a spring at zero."""
+    robot = replace(kuka, masses=(Mass(3, 200.0, (0.3, 0.0, 0.1), 0.1),))
+    model = make_model(
+        robot, TARGETS, compliance=np.zeros(6), identified=True, fitted_frames=False
+    )
+    share = candidates_on(model.sites)["declared_masses[all alike]"]
+    model = model.with_effects([share])
+    true = make_estimate(model, size=0.0)
+    no_errors = np.zeros(len(model.effects[1].parameters))
+    true = replace(true, coefficients=(kuka.compliance, no_errors, np.array([0.2])))
+    observations = observe_exactly(model, true, make_states(6, 30, seed=2))
+    fitted = fit_model(model, observations, NOISE)
+    assert fitted.converged
+    compliance = get_joint_compliances(fitted.model, fitted.estimate)
+    np.testing.assert_allclose(compliance, kuka.compliance, rtol=0.05)

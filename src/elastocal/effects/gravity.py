@@ -75,7 +75,7 @@ def declared_weight(sites: Sites) -> Candidate:
     """
 
     def law(conditions: Conditions) -> Displacements:
-        return _list_by_joint(conditions.mass_torques * conditions.compliance)
+        return _list_by_joint(conditions.mass_torques, conditions.compliance)
 
     width = _WIDTH_OF_LENGTH * float(np.linalg.norm(sites.link_vectors_m, axis=1).sum())
     parameters: list[Parameter] = []
@@ -104,13 +104,19 @@ def declared_weight(sites: Sites) -> Candidate:
     return Candidate(DECLARED_WEIGHT, "declared", (), "", tuple(parameters), law)
 
 
-def _list_by_joint(rotations: np.ndarray) -> Displacements:
-    """List the rotations of the joints per unit of each parameter, ndarray (P, S, n),
-    without the joints that a parameter does not move."""
+def _list_by_joint(torques: np.ndarray, compliance: np.ndarray) -> Displacements:
+    """List the rotations of the joints by the torques (P, S, n) per unit of each
+    parameter, without the joints that a parameter does not load.
+
+    A joint that is loaded and rigid stays in the list, because its compliance may change
+    from step to step.
+    """
     displacements = []
-    for rotation in rotations:
-        joints = np.flatnonzero(rotation.any(axis=0)).tolist()
-        displacements.append({joint: rotation[:, joint] for joint in joints})
+    for torque in torques:
+        joints = np.flatnonzero(torque.any(axis=0)).tolist()
+        displacements.append(
+            {joint: compliance[joint] * torque[:, joint] for joint in joints}
+        )
     return displacements
 
 
@@ -310,7 +316,7 @@ def declared_masses(entry: Effect, sites: Sites) -> Candidates:
 
     def law(conditions: Conditions, shares: np.ndarray) -> Displacements:
         torques = np.tensordot(shares * masses_kg, conditions.mass_torques[indices], 1)
-        return _list_by_joint(torques * conditions.compliance)
+        return _list_by_joint(torques, conditions.compliance)
 
     names = [f"share_of_link_{mass.link}_from_mass_{number}" for number, mass in bodies]
     variants = (
