@@ -1,5 +1,7 @@
 """The calibrated robot as files: what a robot file can hold, and what it leaves out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from analysed_robots import analysed
@@ -99,3 +101,19 @@ def test_effects_that_a_robot_file_cannot_hold_are_left_out_and_change_nothing_e
     expected = np.linalg.norm(with_effects - without_effects, axis=1)
     np.testing.assert_allclose(displacements, expected)
     assert displacements.max() > 1e-6
+
+
+def test_a_joint_without_compliance_is_written_as_a_value_that_is_read_again():
+    robot = analysed("gp180")
+    calibrated = calibrate_by_file(robot)
+    rigid = tuple(
+        np.zeros(6) if effect.effect == "joint_compliance" else values
+        for effect, values in zip(
+            calibrated.model.effects, calibrated.estimate.coefficients, strict=True
+        )
+    )
+    estimate = replace(calibrated.estimate, coefficients=rigid)
+    folded = fold_effects(replace(calibrated, estimate=estimate)).robot
+    written = describe_robot(folded)["compliance_urad_per_Nm"]
+    assert written == pytest.approx([1e-6] * 6)
+    assert parse_robot(describe_robot(folded)).compliance_known

@@ -29,6 +29,11 @@ if TYPE_CHECKING:
     from elastocal.mechanics.robot import Robot
 
 
+# Compliance of a rigid joint in a robot file, rad/(N m): its schema refuses zero, at
+# which a fit keeps a joint that the loads hardly show.
+_LEAST_COMPLIANCE = 1e-12
+
+
 @dataclass(frozen=True)
 class FoldedRobot:
     """A calibrated robot as a robot file describes it: geometry, springs and weights.
@@ -66,7 +71,8 @@ def fold_effects(calibrated: CalibratedRobot) -> FoldedRobot:
                 previous = link_errors.get(joint + 1, np.zeros(6))
                 link_errors[joint + 1] = previous + values
             case "joint_compliance":
-                robot = replace(robot, compliance=values.copy(), compliance_known=True)
+                compliance = np.maximum(values, _LEAST_COMPLIANCE)
+                robot = replace(robot, compliance=compliance, compliance_known=True)
             case "declared_weight":
                 robot = _correct_masses(robot, values)
             case _:
