@@ -3,6 +3,7 @@ loop with what was measured."""
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,9 @@ from elastocal.application.calibrated import compute_nominal_poses, predict_pose
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.reading import read_campaign
 from elastocal.command import campaign as campaign_command
+from elastocal.loop import verification
 from elastocal.loop.calibrated_files import load_diagnosed
+from elastocal.loop.diagnosis_tables import restore_step_model
 
 REPORT = Path("reports/loop/made")
 JOINTS = [f"q{joint}" for joint in range(1, 7)]
@@ -104,6 +107,25 @@ def test_a_robot_that_errs_more_than_predicted_fails_and_goes_round_again(loop):
     assert document["certificate"]["predicted"]["decision"] == "pass"
     assert document["remaining"]["rms_m"] == pytest.approx(1e-3, rel=0.2)
     assert f"elastocal diagnose made --with {loop.measured}" in result.stderr
+
+
+def test_a_reflector_sits_where_the_diagnosis_has_estimated_it(loop, monkeypatch):
+    """A declared offset is a caliper's; that it is wrong by 0.4 mm is no error of the
+    robot if the campaign has found it."""
+    offset_m = np.array([4e-4, -3e-4, 2e-4])
+
+    def restore_with_offset(case, step):
+        model, estimate = restore_step_model(case, step)
+        offsets = estimate.target_offset.copy()
+        offsets[[target.point == "6DoF" for target in case.campaign.targets]] = offset_m
+        return model, replace(estimate, target_offset=offsets)
+
+    loop.write(loop.move() + loop.rotation @ offset_m)
+    _, document = loop.verify()
+    assert not document["prediction"]["held"]
+    monkeypatch.setattr(verification, "restore_step_model", restore_with_offset)
+    _, document = loop.verify()
+    assert document["prediction"]["held"]
 
 
 def test_the_tolerance_of_the_last_certificate_is_taken(loop):
