@@ -8,6 +8,7 @@ from scipy.stats import binom, chi2
 
 from elastocal.diagnosis.gross_errors import (
     describe_gross_errors,
+    describe_standing_out,
     find_gross_errors,
     flag_outliers,
 )
@@ -63,3 +64,13 @@ def test_sentences_state_a_lost_beam_and_a_repeated_position(cases, diagnosis):
     assert "reads 0, 0, 0" in sentences[measurements.row[4]]
     same_point = f"the same point as line {measurements.row[7] + 1} of"
     assert same_point in sentences[measurements.row[8]]
+
+
+def test_rows_that_stay_far_from_the_model_are_described_from_two_poses_on(cases):
+    campaign = cases[0].campaign
+    pose = campaign.measurements.pose
+    first, second = np.unique(pose)[:2]
+    (sentence,) = describe_standing_out(np.isin(pose, [first, second]), campaign)
+    assert "of 2 poses are far from the model and stay" in sentence
+    assert not describe_standing_out(pose == first, campaign)
+    assert describe_standing_out(pose == first, campaign, least_poses=1)

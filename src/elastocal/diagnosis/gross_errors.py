@@ -301,9 +301,12 @@ def describe_gross_errors(
     return gross_errors
 
 
-def describe_standing_out(standing_out: np.ndarray, campaign: Campaign) -> list[str]:
+def describe_standing_out(
+    standing_out: np.ndarray, campaign: Campaign, least_poses: int = _MIN_STANDING_OUT
+) -> list[str]:
     """Describe rows that are far from the model and stay, in one sentence; none if they
-    are of a single pose, which may be one accident that is too small to be called so.
+    are of fewer poses than `least_poses`: a single one may be one accident that is too
+    small to be called so.
 
     Parameters
     ----------
@@ -311,9 +314,11 @@ def describe_standing_out(standing_out: np.ndarray, campaign: Campaign) -> list[
         (N,) of bool.
     campaign
         The campaign.
+    least_poses
+        Fewest poses that are described.
     """
     poses = len(np.unique(campaign.measurements.pose[standing_out]))
-    if poses < _MIN_STANDING_OUT:
+    if poses < least_poses:
         return []
     rows = format_count(int(standing_out.sum()), "row")
     return [

@@ -15,6 +15,7 @@ from elastocal.diagnosis.contamination import weigh_held_out_rows
 from elastocal.diagnosis.gross_errors import (
     OutlierTest,
     describe_gross_errors,
+    describe_standing_out,
     find_held_out_gross_errors,
     format_gross_error_warnings,
 )
@@ -155,6 +156,10 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
             f" with all rows the RMS is {1e3 * summaries[-1].rms_m:.3g} mm"
             f" instead of {1e3 * heldout.after.rms_m:.3g} mm"
         )
+    standing_out = describe_standing_out(
+        outliers.distant & ~outliers.gross, held_out.campaign, least_poses=1
+    )
+    warnings += [f"validation poses: {sentence}" for sentence in standing_out]
     delivered = apply_regression(diagnosis, kept, seed)
     remainder = None
     if delivered is not None:
