@@ -1,6 +1,8 @@
 """`elastocal plan`: a campaign to fill in, and options that are refused before any
 planning."""
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -129,3 +131,44 @@ def test_a_folder_that_diagnose_would_refuse_is_refused_before_measuring(
     folder = tmp_path / name
     message = refusal("plan", ROBOTS / "kuka.yaml", "--folder", folder)
     assert "allowed" in message and not folder.exists()
+
+
+def test_the_sentence_says_whether_the_offset_of_the_tool_is_in_it(plan):
+    answer, _, _ = plan()
+    text = " ".join(answer.split())
+    assert "of its base and of a constant offset at the end effector)" in text
+    assert "The offset of the tool is not in it" in text
+
+
+def test_a_stated_offset_of_the_tool_is_in_the_error(plan):
+    text = " ".join(plan("--target", "6DoF=0,0,0.1")[0].split())
+    assert "(after the best placement of its base): " in text
+    assert "The offset of the tool is in it" in text
+
+
+def test_plan_wants_as_many_poses_as_check_does(plan, elastocal, tmp_path):
+    answer, _, sheet = plan("--target", "6DoF=0,0,0.1")
+    (planned,) = re.findall(r"Measure about (\d+) poses", answer)
+    positions = compute_positions(sheet)
+    noise = 3e-5 * np.random.default_rng(1).standard_normal(positions.shape)
+    x, y, z = (positions + noise).T
+    filled = sheet.assign(done="x", x=x, y=y, z=z)
+    filled.to_csv(tmp_path / "cell" / "measurements.csv", index=False)
+    checked = elastocal("check", tmp_path / "cell")
+    (needed,) = re.findall(r"Measure about (\d+) poses", checked.stdout)
+    assert abs(int(planned) - int(needed)) <= 0.1 * int(needed)
+
+
+def test_a_plan_with_enough_numbers_has_no_remark(plan):
+    options = ("--force", 200, "--pull", "--base-known", "--measured", "pose")
+    targets = ("--target", "6DoF=0,0,0", "--target", "4DoF=0,0,0")
+    assert "poses are few" not in plan(*options, *targets, "--poses", "30")[0]
+
+
+@pytest.mark.parametrize("name", ["cell 7", "-cell", "größe", "a" * 81, "a<b"])
+def test_a_folder_that_check_refuses_is_refused_before_the_planning(
+    refusal, tmp_path, name
+):
+    folder = tmp_path / name
+    refusal(*PLAN, "--folder", folder)
+    assert not folder.exists()

@@ -45,3 +45,15 @@ def test_the_sheet_is_typeset(tmp_path):
     pictures = empty_pictures(tmp_path, ["overview", "poses0"])
     compile_document(tmp_path / "plan.pdf", "plan.typ", {"facts": facts}, pictures)
     assert (tmp_path / "plan.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_a_hanging_load_is_a_mass():
+    survey, plan, _ = make_plan()
+    hanging = replace(survey, force_N=196.133, pulled=False)
+    facts = collect_plan_facts(hanging, plan, build_sheet(hanging, plan), ["worth"])
+    assert facts["heads"][-2] == "hang (kg)" and facts["hanging"]
+    assert all(row["cells"][-1] == "20.00" for row in facts["rows"])
+    assert not any("(N)" in head for head in facts["heads"])
+    pulled = replace(hanging, pulled=True)
+    facts = collect_plan_facts(pulled, plan, build_sheet(pulled, plan), ["worth"])
+    assert facts["heads"][-4:-1] == ["Fx (N)", "Fy (N)", "Fz (N)"]

@@ -21,7 +21,7 @@ def format_millimetres(length_m: float) -> str:
 
 def format_accuracy(accuracy: Accuracy) -> str:
     """Format an accuracy statement with all that belongs to it."""
-    frame = _format_frame(accuracy)
+    frame = format_frame(accuracy.frame, offset_removed=accuracy.offset_removed)
     if not accuracy.fitted and not accuracy.form_m:
         return (
             f"No position error is predicted {frame}: nothing of the robot was fitted."
@@ -47,14 +47,15 @@ def format_accuracy(accuracy: Accuracy) -> str:
     return text
 
 
-def _format_frame(accuracy: Accuracy) -> str:
-    """Say in which frame errors are stated, and which offset is subtracted."""
-    frame = FRAMES[accuracy.frame]
-    if not accuracy.offset_removed:
-        return frame
-    if accuracy.frame == ROBOT:
-        return f"{frame.removesuffix(')')} and {_OFFSET})"
-    return f"{frame} (after the best choice {_OFFSET})"
+def format_frame(frame: str, *, offset_removed: bool) -> str:
+    """Say in which frame, a key of `FRAMES`, errors are stated, and which offset is
+    subtracted."""
+    words = FRAMES[frame]
+    if not offset_removed:
+        return words
+    if frame == ROBOT:
+        return f"{words.removesuffix(')')} and {_OFFSET})"
+    return f"{words} (after the best choice {_OFFSET})"
 
 
 def _format_bounded(accuracy: Accuracy, error_m: float, bound_m: float | None) -> str:

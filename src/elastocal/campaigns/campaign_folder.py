@@ -7,6 +7,7 @@ the project's robot files. `reading.read_campaign` adds the measurements.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +16,7 @@ from typing import Any
 from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, DOCUMENT
 from elastocal.campaigns.measurements import CSV, PARQUET, find_files, is_file_in
 from elastocal.errors import InputError, find_control_character, suggest_names
-from elastocal.io.documents import check_document, read_document
+from elastocal.io.documents import check_document, read_document, read_schema
 from elastocal.io.records import compute_sha256
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import parse_robot
@@ -153,6 +154,16 @@ def check_workflow_path(path: str) -> None:
             "a path without it, which Snakemake does not take for a path; a blank may"
             " stand inside",
         )
+
+
+def check_campaign_name(folder: Path) -> None:
+    """Refuse a folder after which no campaign can be named, before anything is written
+    into it."""
+    check_workflow_path(folder.as_posix())
+    name = folder.absolute().name
+    rule = read_schema("campaign")["properties"]["campaign"]
+    if not re.search(rule["pattern"], name) or len(name) > rule["maxLength"]:
+        raise InputError(folder, "name", repr(name), rule["description"])
 
 
 def read_campaign_folder(path: str | Path, robots_folder: str | Path) -> CampaignFolder:

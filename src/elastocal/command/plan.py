@@ -136,6 +136,7 @@ def plan(
 
     from elastocal.application.planning.plan import choose_plan, find_allowed_candidates
     from elastocal.application.planning.survey import Survey
+    from elastocal.application.pose_counts import warn_of_few_poses
     from elastocal.campaigns.measurements import CSV
     from elastocal.campaigns.reading import read_robot
 
@@ -158,12 +159,23 @@ def plan(
         candidates = find_allowed_candidates(survey, cell, number, seed)
         chosen = choose_plan(survey, candidates, poses, held_out, seed)
     sentences = _describe_plan(survey, chosen, sensor)
-    rows = _write_campaign(folder, robot, survey, cell, chosen, sentences)
+    warnings = warn_of_few_poses(
+        poses,
+        poses * survey.numbers,
+        chosen.parameters,
+        chosen.effective_parameters,
+    )
+    worth = [*sentences, *(f"{warning}." for warning in warnings)]
+    rows = _write_campaign(folder, robot, survey, cell, chosen, worth)
     print_answer(
         f"{format_count(poses, 'pose')} to fit and {held_out} held out, of"
         f" {len(candidates.joint_angles):,} that the cell allows:"
         f" {format_count(rows, 'measurement')}",
-        [*sentences, f"sheet to print: {folder / SHEET}"],
+        [
+            *sentences,
+            *(f"! {warning}" for warning in warnings),
+            f"sheet to print: {folder / SHEET}",
+        ],
         f"measure, fill in {folder / CSV}, then elastocal check {folder}",
         console,
     )
@@ -198,14 +210,13 @@ def _choose_sensor(
 
 
 def _check_new_folder(folder: Path) -> None:
-    """Refuse a folder that exists, and one that `diagnose` would refuse after all has
-    been measured."""
-    from elastocal.campaigns.campaign_folder import check_workflow_path
-
-    check_workflow_path(str(folder.resolve()))
-    refuse_project_name(folder.resolve().name, folder)
+    """Refuse a folder that exists, and one that `check` or `diagnose` would refuse after
+    all has been measured."""
+    from elastocal.campaigns.campaign_folder import check_campaign_name
     from elastocal.io.texts import describe_file_kind
 
+    check_campaign_name(folder.resolve())
+    refuse_project_name(folder.resolve().name, folder)
     if os.path.lexists(folder):
         kind = describe_file_kind(os.lstat(folder).st_mode)
         raise InputError(folder, "", f"{kind} that is there", "a new one")
@@ -292,11 +303,10 @@ def _describe_plan(survey: Survey, chosen: Plan, sensor: Sensor) -> list[str]:
     """State the accuracy that a plan gives, and the noise on which it is based."""
     import numpy as np
 
-    from elastocal.application.frames import BASE, FRAMES, ROBOT
-    from elastocal.application.statements import format_millimetres
+    from elastocal.application.statements import format_frame, format_millimetres
 
     low, median, high = 1e3 * np.quantile(chosen.random_m[:, -1], [0.05, 0.5, 0.95])
-    frame = FRAMES[ROBOT if survey.unknown_base else BASE]
+    frame = format_frame(survey.frame, offset_removed=survey.offset_removed)
     noise = f"{1e6 * survey.position_m:.3g} µm"
     if survey.measured == "pose":
         noise += f", {1e6 * survey.orientation_rad:.3g} µrad"
@@ -305,11 +315,21 @@ def _describe_plan(survey: Survey, chosen: Plan, sensor: Sensor) -> list[str]:
         "Predicted position error of a robot that is corrected by the fit,"
         f" {frame}: {format_millimetres(chosen.accuracy_m[-1])} RMS over configurations"
         " that the cell allows; with as many random poses"
-        f" {median:.3f} mm ({low:.3f} to {high:.3f}).",
+        f" {median:.3f} mm ({low:.3f} to {high:.3f}). {_describe_tool(survey)}",
         "It is a standard error by the uncertainty of the parameters alone,"
         " without the tracker's noise.",
         f"Assumed noise: {noise}{source}.",
     ]
+
+
+def _describe_tool(survey: Survey) -> str:
+    """Say whether the error contains that of the tool's offset."""
+    if survey.offset_removed:
+        return (
+            "The offset of the tool is not in it, because that of the reflector is fitted"
+            " in its place."
+        )
+    return "The offset of the tool is in it, known as well as that of the reflectors."
 
 
 def _write_campaign(

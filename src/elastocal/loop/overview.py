@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.application.pose_counts import warn_of_few_poses
 from elastocal.campaigns.campaign import tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.holdout import list_poses
@@ -278,16 +279,9 @@ def _list_shortcomings(
 
 def _warn_of_few_poses(declared: Fit, poses: int) -> list[str]:
     """Return a warning if poses are too few for the parameters of the declared model."""
-    numbers = declared.residual.size
-    effective = count_effective_parameters(declared)
-    parameters = int((~declared.unidentifiable).sum())
-    needed = poses * Settings().numbers_a_parameter * effective / numbers
-    needed_poses = int(np.ceil(needed))
-    if needed_poses <= poses:
-        return []
-    return [
-        f"{poses} poses are few for {parameters} parameters, of which they determine "
-        f"about {effective:.0f}, by {numbers} numbers: other poses will be off by more "
-        f"than these. Measure about {needed_poses} poses to fit, or orientations too, "
-        "or declare fewer errors"
-    ]
+    return warn_of_few_poses(
+        poses,
+        declared.residual.size,
+        int((~declared.unidentifiable).sum()),
+        count_effective_parameters(declared),
+    )

@@ -3,6 +3,7 @@ measurement, pictures, and the expected accuracy."""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from elastocal.campaigns.measurements import DISPLAY_UNITS
@@ -50,15 +51,21 @@ def collect_plan_facts(
         for name in map(str, rows)
         if name.startswith("q") and name.rpartition("_")[2] in DISPLAY_UNITS
     ]
-    force_columns = ["fx", "fy", "fz"] if survey.loaded else []
+    force_columns = ["fx", "fy", "fz"] if survey.loaded and survey.pulled else []
     heads = ["pose"]
     for name in angle_columns:
         joint, _, unit = name.partition("_")
         heads.append(f"{joint} ({_UNITS[unit]})")
     heads += [f"F{name[1]} (N)" for name in force_columns]
+    # People hang masses, not forces.
+    hanging = [_format_hanging_mass(survey)] if survey.hanging else []
+    heads += ["hang (kg)"] * len(hanging)
     poses = [
         {
-            "cells": _format_pose(pose, measurements, angle_columns, force_columns),
+            "cells": [
+                *_format_pose(pose, measurements, angle_columns, force_columns),
+                *hanging,
+            ],
             "visits": _count_visits(survey, measurements),
         }
         for pose, measurements in rows.groupby("pose")
@@ -68,6 +75,7 @@ def collect_plan_facts(
         "robot": survey.robot.name,
         "targets": [_describe_target(target) for target in survey.targets],
         "loaded": survey.loaded,
+        "hanging": survey.hanging,
         "counts": [
             format_count(fitted, "pose"),
             f"{len(poses) - fitted}",
@@ -93,6 +101,12 @@ def _format_pose(
     full_load = measurements[measurements["load"] == 1]
     cells += [f"{round(full_load[name].iloc[0]) + 0:d}" for name in force_columns]
     return cells
+
+
+def _format_hanging_mass(survey: Survey) -> str:
+    """Return the mass, kg, whose weight is the full load."""
+    gravity = math.hypot(*survey.robot.gravity_m_s2)
+    return f"{survey.force_N / gravity:.2f}"
 
 
 def _count_visits(survey: Survey, measurements: pd.DataFrame) -> list[dict[str, Any]]:

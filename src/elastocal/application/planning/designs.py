@@ -126,6 +126,15 @@ def compute_information_matrix(
     return add_prior(flat.T @ flat)
 
 
+def count_effective_parameters(
+    rows: np.ndarray, chosen: np.ndarray | list[int]
+) -> float:
+    """Count the parameters that chosen candidates determine; one that its prior
+    determines as well counts by the share that they add."""
+    inverse = np.linalg.inv(compute_information_matrix(rows, chosen))
+    return float(len(inverse) - np.trace(inverse))
+
+
 def choose_greedily(rows: np.ndarray, count: int, criterion: Criterion) -> list[int]:
     """Choose candidates, each the one with the largest gain after those before it.
 

@@ -14,6 +14,7 @@ from elastocal.application.planning.designs import (
     add_prior,
     choose_greedily,
     compute_mean_gram,
+    count_effective_parameters,
     exchange_candidates,
 )
 from elastocal.application.planning.survey import (
@@ -80,12 +81,16 @@ class Plan:
         uncertainty of the parameters, as `accuracy` counts it, with the first 1, 2, ..
         of the fitted configurations, best first.
     random_m : (designs, poses) the same for random configurations.
+    parameters : number of parameters of the declared model.
+    effective_parameters : how many of them the fitted configurations determine.
     """
 
     fitted: Candidates
     held_out: Candidates
     accuracy_m: np.ndarray
     random_m: np.ndarray
+    parameters: int
+    effective_parameters: float
 
 
 def find_allowed_candidates(
@@ -174,6 +179,8 @@ def choose_plan(
         np.array(
             [compute_accuracy_curve(rows, design, weight) for design in random_designs]
         ),
+        len(owners),
+        count_effective_parameters(rows, chosen),
     )
 
 

@@ -134,6 +134,23 @@ class Survey:
         """Whether any measurement is under a load."""
         return self.force_N > 0.0
 
+    @property
+    def hanging(self) -> bool:
+        """Whether the load is a hanging weight."""
+        return self.loaded and not self.pulled
+
+    @property
+    def frame(self) -> str:
+        """Frame in which the accuracy is stated, a key of `frames.FRAMES`."""
+        return ROBOT if self.unknown_base else BASE
+
+    @property
+    def offset_removed(self) -> bool:
+        """Whether a constant offset at the end effector is no error, because that of
+        its targets is fitted."""
+        end_effector = self.robot.chain.end_effector.name
+        return is_offset_fitted(self.targets, end_effector)
+
     def draw_forces(self, count: int, stream: np.random.Generator) -> np.ndarray:
         """Draw a force for each of N configurations, (N, 3), N, base axes."""
         if self.pulled:
@@ -246,9 +263,7 @@ def compute_accuracy_rows(
     sensitivities = compute_pose_sensitivities(calibrated, reported_angles, wrench)
     position, rotation = compute_nominal_poses(robot, reported_angles)
     scope = Scope(
-        ROBOT if survey.unknown_base else BASE,
-        position.mean(axis=0),
-        offset_removed=is_offset_fitted(survey.targets, robot.chain.end_effector.name),
+        survey.frame, position.mean(axis=0), offset_removed=survey.offset_removed
     )
     commanded = list_parameters(calibrated.model, calibrated.estimate)
     plausible = np.array([parameter.plausible for _, parameter in commanded])
