@@ -39,6 +39,7 @@ def test_errors_are_stated_with_level_power_and_frame():
     facts = collect_verification_facts(make_verification())
     assert "test at 5 %" in facts["prediction"]
     assert "0.090 mm RMS in 80 % of cases" in facts["prediction"]
+    assert "after the same placement" in facts["prediction"]
     assert "best placement" in facts["whose"] and "target 3" in facts["whose"]
     assert "1 corrected target was not measured" in facts["whose"]
     errors = dict(facts["errors"])
