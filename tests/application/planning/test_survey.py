@@ -24,9 +24,13 @@ def survey():
 
 
 def with_plausible_priors(model):
-    """Give each parameter but the compliances a prior of one plausible size, as the plan
-    does."""
+    """Give each parameter a prior of one plausible size, and the compliances none, as
+    the plan does."""
     compliance, *effects = model.effects
+    free = tuple(
+        replace(parameter, prior_std=None) for parameter in compliance.parameters
+    )
+    compliance = replace(compliance, parameters=free)
     priors = []
     for effect in effects:
         parameters = tuple(
