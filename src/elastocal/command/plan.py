@@ -37,6 +37,10 @@ if TYPE_CHECKING:
 ROBOT = "robot.yaml"
 SHEET = "plan.pdf"
 PICTURE = "plan.png"
+# Number of allowed configurations over which changes of a plan are compared, and the
+# share of its error below which a change is worth a sentence.
+_WORKSPACE = 300
+_NOTICEABLE_SHARE = 0.8
 # Upper bound on the name of a target, as in campaign.yaml.
 _LONGEST_NAME = 80
 # Bound on the height of the floor, either way.
@@ -134,6 +138,7 @@ def plan(
     """
     from rich.console import Console
 
+    from elastocal.application.planning.improvements import compare_improvements
     from elastocal.application.planning.plan import choose_plan, find_allowed_candidates
     from elastocal.application.planning.survey import Survey
     from elastocal.application.pose_counts import warn_of_few_poses
@@ -158,7 +163,11 @@ def plan(
     with console.status("planning"):
         candidates = find_allowed_candidates(survey, cell, number, seed)
         chosen = choose_plan(survey, candidates, poses, held_out, seed)
+        improvements = compare_improvements(
+            survey, chosen.fitted, candidates.select(slice(_WORKSPACE))
+        )
     sentences = _describe_plan(survey, chosen, sensor)
+    sentences += _describe_improvement(improvements)
     warnings = warn_of_few_poses(
         poses,
         poses * survey.numbers,
@@ -319,6 +328,24 @@ def _describe_plan(survey: Survey, chosen: Plan, sensor: Sensor) -> list[str]:
         "It is a standard error by the uncertainty of the parameters alone,"
         " without the tracker's noise.",
         f"Assumed noise: {noise}{source}.",
+    ]
+
+
+def _describe_improvement(accuracy_m: dict[str, float]) -> list[str]:
+    """Say what would help most, if it would help noticeably."""
+    from elastocal.application.statements import format_millimetres
+
+    best = min(accuracy_m, key=lambda words: accuracy_m[words])
+    if accuracy_m[best] > _NOTICEABLE_SHARE * accuracy_m[""]:
+        return []
+    others = [
+        f"{words} {format_millimetres(error_m)}"
+        for words, error_m in accuracy_m.items()
+        if words not in ("", best)
+    ]
+    return [
+        f"What would help most: {best}, {format_millimetres(accuracy_m[best])}"
+        f" in place of {format_millimetres(accuracy_m[''])} ({'; '.join(others)})."
     ]
 
 

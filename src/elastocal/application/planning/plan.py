@@ -64,7 +64,7 @@ class Candidates:
     joint_angles: np.ndarray
     force: np.ndarray
 
-    def select(self, chosen: np.ndarray | list[int]) -> Candidates:
+    def select(self, chosen: np.ndarray | list[int] | slice) -> Candidates:
         """Select configurations by their numbers."""
         return Candidates(self.joint_angles[chosen], self.force[chosen])
 

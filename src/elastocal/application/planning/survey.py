@@ -232,7 +232,11 @@ def compute_information_rows(
 
 
 def compute_accuracy_rows(
-    survey: Survey, reported_angles: np.ndarray, force: np.ndarray
+    survey: Survey,
+    reported_angles: np.ndarray,
+    force: np.ndarray,
+    *,
+    offset_removed: bool | None = None,
 ) -> np.ndarray:
     """Compute the sensitivities of the end effector's position, as `accuracy` counts it.
 
@@ -245,6 +249,8 @@ def compute_accuracy_rows(
     survey : says what is unknown.
     reported_angles : (N, n) configurations at which the robot shall be accurate, rad.
     force : (N, 3) load under which it works there, N, base axes.
+    offset_removed : whether a constant offset is no error; by default as the survey
+        says.
 
     Returns
     -------
@@ -253,18 +259,24 @@ def compute_accuracy_rows(
     robot = survey.robot
     model, estimate = declare_model(survey)
     count = len(list_parameters(model, estimate))
-    noise = Noise(
-        "declared", survey.position_m, survey.orientation_rad, np.zeros(robot.joints)
-    )
     calibrated = calibrate_by_model(
-        robot, model, estimate, np.zeros((count, count)), noise
+        robot,
+        model,
+        estimate,
+        np.zeros((count, count)),
+        Noise(
+            "declared",
+            survey.position_m,
+            survey.orientation_rad,
+            np.zeros(robot.joints),
+        ),
     )
     wrench = np.hstack([force, np.zeros_like(force)])
     sensitivities = compute_pose_sensitivities(calibrated, reported_angles, wrench)
     position, rotation = compute_nominal_poses(robot, reported_angles)
-    scope = Scope(
-        survey.frame, position.mean(axis=0), offset_removed=survey.offset_removed
-    )
+    if offset_removed is None:
+        offset_removed = survey.offset_removed
+    scope = Scope(survey.frame, position.mean(axis=0), offset_removed=offset_removed)
     commanded = list_parameters(calibrated.model, calibrated.estimate)
     plausible = np.array([parameter.plausible for _, parameter in commanded])
     residual = subtract_placement(scope, position, rotation, sensitivities * plausible)
