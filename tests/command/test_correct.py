@@ -84,11 +84,16 @@ def test_the_targets_bring_the_diagnosed_robot_to_the_wanted_poses(
 
 
 def test_a_program_has_the_targets_and_says_where_they_are_from(
-    elastocal, correct_arguments, output
+    elastocal, correct_arguments, output, checkout
 ):
     result = elastocal(*correct_arguments, "--format", "krl")
     assert result.exit_code == 0, result.stderr
     answer = join_lines(result.stderr)
+    measured = load_diagnosed(
+        checkout / "made", ROBOTS, checkout
+    ).case.campaign.measured
+    is_said = "orientations were not measured" in answer
+    assert is_said == (measured == "position")
     assert "targets.src goes to all of them: KUKA KRL, q1 as A1" in answer
     program = output.with_suffix(".src").read_text()
     for remark in (

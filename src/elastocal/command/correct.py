@@ -134,6 +134,11 @@ def correct(
     _write_targets(output, corrected, campaign.name, program, axis_names)
     note_written_files(files, find_workplace())
     details = describe_path_accuracy(corrected)
+    if details and campaign.case.campaign.measured == "position":
+        details.append(
+            "orientations were not measured: a turn of the tool that positions do not"
+            " show is not in their error"
+        )
     remainder = campaign.verdict.remainder
     if remainder and campaign.calibrated.residual_model:
         details.append(describe_regression(corrected, remainder.words))
