@@ -89,7 +89,8 @@ def test_the_whole_way_ends_with_a_certificate_and_a_robot_that_is_as_near_as_no
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     reports = tmp_path / "reports" / "loop" / campaign
     assert all(
-        (reports / name).stat().st_size for name in ("report.pdf", "certificate.pdf")
+        (reports / name).stat().st_size
+        for name in ("report.pdf", "certificate.pdf", "verification.pdf")
     )
     assert json.loads((reports / "verdict.json").read_text(encoding="utf-8"))["effects"]
     if campaign == "kr16":
