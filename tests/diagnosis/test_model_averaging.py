@@ -10,6 +10,8 @@ from scipy.optimize import minimize
 
 from elastocal.diagnosis.evidence import ModelDensity
 from elastocal.diagnosis.model_averaging import (
+    ModelAverage,
+    allow_for_laws,
     average_models,
     compute_explained_squares,
     compute_extra_squares,
@@ -260,3 +262,31 @@ def test_the_extra_sum_of_squares_is_the_least_penalised_sum_that_the_other_term
     explained = compute_explained_squares(problem, alone)["a"]
     extra = compute_extra_squares(problem, alone, {"a"})[0].extra
     assert extra == pytest.approx(explained)
+
+
+@pytest.mark.parametrize("poses", [4, 400])
+def test_intervals_widen_with_the_squares_by_which_a_law_may_be_off(
+    rows_and_design, poses
+):
+    """The departure adds to the variance of each pose, which noise alone makes one."""
+    problem = rows_and_design[1].problem
+    model = ScoredModel((0, 1, 2), 0.0, np.array([1.0, 0.3, 1.0]), 0.0)
+    std_error = {
+        ("a", "0"): 2.0,
+        ("a", "1"): 3.0,
+        ("b", "0"): 5.0,
+        DECLARED_PARAMETERS[0]: 7.0,
+    }
+    widened = allow_for_laws(problem, model, ModelAverage({}, std_error), poses)
+    squares = compute_explained_squares(problem, model)
+    tolerance = problem.settings.law_tolerance**2
+    variance = {name: 1.0 + tolerance * squares[name] / poses for name in "ab"}
+    assert widened.std_error == pytest.approx(
+        {
+            ("a", "0"): 2.0 * np.sqrt(variance["a"]),
+            ("a", "1"): 3.0 * np.sqrt(variance["a"]),
+            ("b", "0"): 5.0 * np.sqrt(variance["b"]),
+            DECLARED_PARAMETERS[0]: 7.0,
+        }
+    )
+    assert variance["a"] > 1.0

@@ -49,6 +49,13 @@ ROWS = make_rows()
 # plausible size.
 CONTRIBUTIONS = ROWS.candidates[:, [OFFSET_3, OTHER_2]].sum(axis=1)
 PROBLEM, _ = make_problem(replace(ROWS, residual=ROWS.expected + CONTRIBUTIONS), TERMS)
+# Decisions from probabilities as they are, where each mechanism is significant.
+ALL_EFFECTS = ROWS.candidates[:, : OTHER_2 + 1].sum(axis=1)
+ALL_ACT, _ = make_problem(
+    replace(ROWS, residual=ROWS.expected + 3.0 * ALL_EFFECTS),
+    TERMS,
+    replace(SETTINGS, confusable_share=0.0),
+)
 RAISED = Alarm(0.002, 9.0, raised=True)
 SILENT = Alarm(0.4, -1.0, raised=False)
 
@@ -91,10 +98,10 @@ CONCLUSIONS = {
     "named with enough probability": Expected(
         {"0": 0.6, "1": 0.25, "2": 0.1}, NAMED, ("offset",), {"offset": ()}, 0.85
     ),
-    # The alarm decides that something is missing. A name still needs a probability, of
-    # which "nothing" has its share.
+    # The alarm decides that something is missing. Nothing is stated that is less probable
+    # than "nothing".
     "an alarm against an improbable mechanism": Expected(
-        {"0": 0.12, "2": 0.02}, CLASS, ("offset",), {"offset": ()}, 0.12
+        {"0": 0.12, "2": 0.02}, UNEXPLAINED, (), {}, 0.86
     ),
     "a class of the mechanisms that are worth a line": Expected(
         {"0": 0.5, "2": 0.3, "3": 0.19, "32": 0.001},
@@ -130,7 +137,7 @@ def test_the_verdict_has_the_least_expected_loss_once_an_alarm_is_raised(case):
     expected = CONCLUSIONS[case]
     models = [(tuple(map(int, key)), share) for key, share in expected.models.items()]
     alarm = SILENT if expected.verdict == ADEQUATE else RAISED
-    conclusion = conclude(PROBLEM, make_posterior(*models), alarm)
+    conclusion = conclude(ALL_ACT, make_posterior(*models), alarm)
     assert conclusion.verdict == expected.verdict
     assert conclusion.best.mechanisms == expected.best
     assert conclusion.alternatives == expected.alternatives
@@ -153,7 +160,7 @@ def test_no_stated_probability_exceeds_one_by_rounding():
         ScoredModel((), 0.0, np.ones(0), 0.0),
     )
     posterior = Posterior(models, np.array([0.5, 0.5 + 4e-15, 0.0]))
-    conclusion = conclude(PROBLEM, posterior, RAISED)
+    conclusion = conclude(ALL_ACT, posterior, RAISED)
     assert conclusion.verdict == NAMED
     assert conclusion.probability == 1.0
     assert conclusion.mechanisms["offset"] == 1.0
@@ -194,7 +201,7 @@ def test_a_test_of_the_set_up_alone_says_nothing_about_the_robot():
     """A step of the set-up can be tested on a single pose. If none is found, the robot
     was not tested; if one is found, it is named."""
     step = make_term("setup_step", (), 0, candidate=SETUP_CANDIDATE)
-    problem = replace(PROBLEM, terms=(step, *TERMS[OTHER_1:]))
+    problem = replace(ALL_ACT, terms=(step, *TERMS[OTHER_1:]))
     silent = conclude(problem, make_posterior(((0,), 0.1)), SILENT)
     assert silent.verdict == NOT_TESTABLE
     raised = conclude(problem, make_posterior(((0,), 0.9)), RAISED)

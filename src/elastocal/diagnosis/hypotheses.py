@@ -114,13 +114,18 @@ class ModelPrior:
         return term.log_prior + float(log_odds[count + 1] - log_odds[count])
 
 
-def build_model_prior(terms: Sequence[ModelTerm], settings: Settings) -> ModelPrior:
-    """Build the prior of all models that some terms can form."""
+def get_presence_probability(mechanism: str, settings: Settings) -> float:
+    """Look up the prior probability of a mechanism, at any of its locations."""
     special_probabilities = {
         "link_weight": settings.gravity_probability,
         OTHER: settings.other_probability,
         LOCAL_EFFECT: settings.other_probability,
     }
+    return special_probabilities.get(mechanism, settings.mechanism_probability)
+
+
+def build_model_prior(terms: Sequence[ModelTerm], settings: Settings) -> ModelPrior:
+    """Build the prior of all models that some terms can form."""
     slots = {term.slot for term in terms}
     log_odds: dict[str, np.ndarray] = {}
     for mechanism, locations in Counter(mechanism for mechanism, *_ in slots).items():
@@ -135,9 +140,7 @@ def build_model_prior(terms: Sequence[ModelTerm], settings: Settings) -> ModelPr
             - gammaln(counts + 1)
             - gammaln(locations - counts + 1)
         )
-        presence = logit(
-            special_probabilities.get(mechanism, settings.mechanism_probability)
-        )
+        presence = logit(get_presence_probability(mechanism, settings))
         log_odds[mechanism] = np.append(
             0.0, presence + geometric - logsumexp(geometric) - log_sets
         )

@@ -13,7 +13,7 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -120,6 +120,36 @@ def average_models(
         std_error[key] = float(np.sqrt(weight @ (variance + (mean - average) ** 2)))
     prior_dominated = _find_prior_dominated(problem, best, std_error)
     return ModelAverage(shift, std_error, prior_dominated)
+
+
+def allow_for_laws(
+    problem: SearchProblem, model: ScoredModel, average: ModelAverage, poses: int
+) -> ModelAverage:
+    """Widen the standard errors of effects whose laws are only nearly true.
+
+    A machine departs from a law by the tolerance t of the displacements. Their whitened
+    squares S are shared by the poses, and so is the departure, which all measurements of
+    a pose have in common. It adds t^2 S / poses to the variance of each pose, which is
+    one: a model discrepancy [1]_ as large as the law is uncertain, and negligible for an
+    effect that is barely seen.
+
+    References
+    ----------
+    .. [1] Brynjarsdóttir, J. and O'Hagan, A., Learning about physical parameters: the
+       importance of model discrepancy, Inverse Problems 30, 2014.
+    """
+    squares = compute_explained_squares(problem, model)
+    tolerance = problem.settings.law_tolerance**2
+    std_error = dict(average.std_error)
+    for index in model.term_indices:
+        term = problem.terms[index]
+        if term.candidate is None:
+            continue
+        factor = np.sqrt(1.0 + tolerance * squares[term.mechanism] / poses)
+        for parameter in term.candidate.parameters:
+            key = (term.candidate.key, parameter.name)
+            std_error[key] = float(factor * average.std_error[key])
+    return replace(average, std_error=std_error)
 
 
 def _find_prior_dominated(

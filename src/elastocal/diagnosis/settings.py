@@ -54,6 +54,7 @@ class Settings:
     useful: float = _DEFAULT.useful
     prior_share: float = _DEFAULT.prior_share
     law_tolerance: float = _DEFAULT.law_tolerance
+    confusable_share: float = _DEFAULT.confusable_share
     smooth_tolerance: float = _DEFAULT.smooth_tolerance
     credible: float = _DEFAULT.credible
     gross_error_level: float = _DEFAULT.gross_error_level

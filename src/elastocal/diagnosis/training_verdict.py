@@ -18,6 +18,7 @@ from elastocal.diagnosis.effect_estimates import (
 from elastocal.diagnosis.gross_errors import format_gross_error_warnings
 from elastocal.diagnosis.model_averaging import (
     ModelAverage,
+    allow_for_laws,
     average_models,
     compute_between_model_squares,
 )
@@ -177,8 +178,13 @@ def _state_evidence(
     kept_average = average
     if kept_model is not named_model:
         kept_average = average_models(design, posterior, kept_model, owners)
+    observations = result.case.observations
+    poses = int(observations.cluster.max()) + 1
     effects = state_effects(
-        evidence, result.full_model, average, result.case.observations
+        evidence,
+        result.full_model,
+        allow_for_laws(design.problem, named_model, average, poses),
+        observations,
     )
     between_models = compute_between_model_squares(
         design.problem, posterior, kept_model

@@ -23,8 +23,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import chdtrc, fdtrc
 
+from elastocal.diagnosis.confounding import (
+    compute_joint_p_value,
+    find_confounded_mechanisms,
+)
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.model_averaging import compute_extra_squares
+from elastocal.diagnosis.tempering import temper_hypotheses
 from elastocal.fitting.least_squares import compute_negative_compliances
 from elastocal.fitting.noise import count_effective_parameters
 
@@ -167,7 +172,8 @@ def conclude(problem: SearchProblem, posterior: Posterior, alarm: Alarm) -> Conc
     alarm
         Test of whether anything is missing.
     """
-    hypotheses = rank_hypotheses(problem, posterior)
+    ranked = rank_hypotheses(problem, posterior)
+    hypotheses = temper_hypotheses(problem, posterior, ranked)
     nothing = next(h for h in hypotheses if not h.mechanisms)
     mechanisms = _compute_inclusion_probabilities(hypotheses)
     families = {term.candidate.family for term in problem.terms if term.candidate}
@@ -178,43 +184,95 @@ def conclude(problem: SearchProblem, posterior: Posterior, alarm: Alarm) -> Conc
         return Conclusion(
             ADEQUATE, hypotheses, nothing, {}, mechanisms, nothing.probability
         )
-    return _choose_verdict(hypotheses, mechanisms, problem.settings)
+    leaders = _choose_leaders(problem, posterior, ranked)
+    conclusion, stated = _choose_verdict(
+        hypotheses, leaders, mechanisms, problem.settings
+    )
+    return _add_confounded_mechanisms(problem, posterior, conclusion, stated)
+
+
+def _choose_leaders(
+    problem: SearchProblem, posterior: Posterior, ranked: Sequence[Hypothesis]
+) -> tuple[str, tuple[str, ...] | None]:
+    """Choose how many mechanisms act, as a verdict, and the mechanisms that lead.
+
+    Of the hypotheses with the most probable number of mechanisms, the most probable one
+    leads by which each mechanism explains something significant, at the level of the
+    alarm; None if there is none.
+    """
+    by_verdict: dict[str, list[Hypothesis]] = {UNEXPLAINED: [], CLASS: [], SEVERAL: []}
+    by_count = list(by_verdict)
+    for hypothesis in ranked:
+        if hypothesis.mechanisms:
+            by_verdict[by_count[min(len(hypothesis.named), 2)]].append(hypothesis)
+    verdict = max(by_verdict, key=lambda name: _sum_probabilities(by_verdict[name]))
+    for hypothesis in by_verdict[verdict]:
+        model = posterior.models[hypothesis.model]
+        p_values = [
+            compute_joint_p_value(problem, model, name) for name in hypothesis.named
+        ]
+        if max(p_values, default=0.0) <= problem.settings.alarm_level:
+            return verdict, hypothesis.mechanisms
+    return verdict, None
 
 
 def _choose_verdict(
     hypotheses: tuple[Hypothesis, ...],
+    leaders: tuple[str, tuple[str, ...] | None],
     mechanisms: dict[str, float],
     settings: Settings,
-) -> Conclusion:
+) -> tuple[Conclusion, Sequence[Hypothesis]]:
     """Choose a verdict after an alarm, which has decided that something is missing.
+
+    The evidence as it is chooses the hypothesis that leads, whose model is fitted. How
+    certain it is follows from tempered probabilities. Nothing is stated that is less
+    probable than "nothing is missing".
 
     Parameters
     ----------
     hypotheses : tuple of Hypothesis
-        The most probable one first.
+        With tempered probabilities, the most probable one first.
+    leaders : tuple
+        Result of `_choose_leaders`.
     mechanisms : dict
         Posterior inclusion probabilities.
     settings : Settings
         The losses.
+
+    Returns
+    -------
+    Conclusion
+        The verdict.
+    sequence of Hypothesis
+        The hypotheses of which one is right if the verdict is.
     """
-    nothing = next(h for h in hypotheses if not h.mechanisms)
-    missing = [hypothesis for hypothesis in hypotheses if hypothesis.mechanisms]
-    by_verdict: dict[str, list[Hypothesis]] = {UNEXPLAINED: [], CLASS: [], SEVERAL: []}
-    by_count = list(by_verdict)
-    for hypothesis in missing:
-        by_verdict[by_count[min(len(hypothesis.named), 2)]].append(hypothesis)
-    verdict = max(by_verdict, key=lambda name: _sum_probabilities(by_verdict[name]))
-    best = next(iter(by_verdict[verdict]), nothing)
-    competitors = [hypothesis for hypothesis in missing if hypothesis != best]
+    tempered = {hypothesis.mechanisms: hypothesis for hypothesis in hypotheses}
+    nothing = tempered[()]
+    verdict, leading = leaders
+    best = tempered[leading or ()]
+    competitors = [
+        hypothesis
+        for hypothesis in hypotheses
+        if hypothesis.mechanisms and hypothesis != best
+    ]
     state_alone, stated = _minimize_expected_loss([best, *competitors], settings)
+    is_named = state_alone and verdict == CLASS and OTHER not in best.mechanisms
+    if is_named:
+        stated = [best]
+    if best is nothing or _sum_probabilities(stated) < nothing.probability:
+        stated = []
     alternatives: dict[str, tuple[str, ...]] = {}
     if verdict == UNEXPLAINED or not stated:
         verdict = UNEXPLAINED
-        probability = _sum_probabilities(by_verdict[UNEXPLAINED])
+        probability = sum(
+            hypothesis.probability
+            for hypothesis in hypotheses
+            if hypothesis.mechanisms and not hypothesis.named
+        )
         if not stated:
             best = nothing
             probability += nothing.probability
-    elif state_alone and verdict == CLASS and OTHER not in best.mechanisms:
+    elif is_named:
         verdict = NAMED
         # Rounding may carry the sum of the models beyond one.
         probability = min(best.probability, 1.0)
@@ -224,7 +282,47 @@ def _choose_verdict(
         alternatives = {
             name: _find_alternatives(name, best, stated) for name in best.named
         }
-    return Conclusion(verdict, hypotheses, best, alternatives, mechanisms, probability)
+    conclusion = Conclusion(
+        verdict, hypotheses, best, alternatives, mechanisms, probability
+    )
+    return conclusion, stated
+
+
+def _add_confounded_mechanisms(
+    problem: SearchProblem,
+    posterior: Posterior,
+    conclusion: Conclusion,
+    stated: Sequence[Hypothesis],
+) -> Conclusion:
+    """Add to each name the mechanisms that this campaign cannot distinguish from it.
+
+    A verdict that names one mechanism becomes a class with them, and its probability is
+    that of the whole class.
+    """
+    best = conclusion.best
+    if not best.named or conclusion.verdict == UNEXPLAINED:
+        return conclusion
+    model = posterior.models[best.model]
+    alternatives = {}
+    replaced: set[tuple[str, ...]] = set()
+    for name, listed in conclusion.alternatives.items():
+        confounded = find_confounded_mechanisms(problem, model, name)
+        alternatives[name] = tuple(dict.fromkeys((*listed, *confounded)))
+        others = [mechanism for mechanism in best.mechanisms if mechanism != name]
+        replaced |= {tuple(sorted([*others, other])) for other in confounded}
+    if not replaced:
+        return conclusion
+    listed_hypotheses = [
+        hypothesis
+        for hypothesis in conclusion.hypotheses
+        if hypothesis in stated or hypothesis.mechanisms in replaced
+    ]
+    return replace(
+        conclusion,
+        verdict=CLASS if conclusion.verdict == NAMED else conclusion.verdict,
+        alternatives=alternatives,
+        probability=min(_sum_probabilities(listed_hypotheses), 1.0),
+    )
 
 
 def _compute_inclusion_probabilities(

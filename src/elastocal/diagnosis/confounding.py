@@ -1,0 +1,258 @@
+"""Mechanisms that are practically not distinguishable on a campaign: one cause, one
+name.
+
+No machine follows a modelled law exactly. Two mechanisms are therefore one name with
+alternatives if the displacements of one are those of the other within the tolerance of
+laws, however small the noise is. The displacements are compared in the metric of the
+noise, with the declared parameters eliminated: the share of the squares that the other
+mechanism reproduces is the squared cosine of a principal angle [1]_.
+
+The other mechanism reproduces them at the sizes that it reaches, and with as many
+parameters as the named one has: a mechanism of many parameters can imitate any other,
+and Occam's razor has decided between such two before. Its parameters are chosen by
+orthogonal matching pursuit [2]_.
+
+A mechanism may be named only if all that it explains together is significant, by the
+score test of a variance component [3]_: many parameters of which each is zero within
+its error may be nothing together.
+
+References
+----------
+.. [1] Björck, Å. and Golub, G. H., Numerical methods for computing angles between
+   linear subspaces, Mathematics of Computation 27, 1973.
+.. [2] Pati, Y. C., Rezaiifar, R. and Krishnaprasad, P. S., Orthogonal matching pursuit,
+   27th Asilomar Conference on Signals, Systems and Computers, 1993.
+.. [3] Lin, X., Variance component testing in generalised linear models with random
+   effects, Biometrika 84, 1997.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.stats import chi2
+
+from elastocal.diagnosis.hypotheses import OTHER
+from elastocal.diagnosis.refit import predict_reduced_chi_square
+from elastocal.diagnosis.search import solve_positive_definite
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from elastocal.diagnosis.search import ScoredModel, SearchProblem
+
+
+def find_confounded_mechanisms(
+    problem: SearchProblem, model: ScoredModel, mechanism: str
+) -> tuple[str, ...]:
+    """Find the mechanisms that reproduce what one mechanism of a model explains.
+
+    Parameters
+    ----------
+    problem
+        The linearised problem.
+    model
+        One of its models.
+    mechanism
+        Name of a mechanism of the model.
+
+    Returns
+    -------
+    tuple of str
+        Mechanisms that the model does not have, and that reproduce more of the squares
+        than one minus the square of the tolerance of laws.
+    """
+    present = {problem.terms[index].mechanism for index in model.term_indices}
+    terms_by_mechanism: dict[str, list[int]] = defaultdict(list)
+    for index, term in enumerate(problem.terms):
+        if term.mechanism not in {OTHER, *present}:
+            terms_by_mechanism[term.mechanism].append(index)
+    target = _Target.of_mechanism(problem, model, mechanism)
+    return tuple(
+        name
+        for name, indices in terms_by_mechanism.items()
+        if target.is_reproduced_by(indices)
+    )
+
+
+def compute_joint_p_value(
+    problem: SearchProblem, model: ScoredModel, mechanism: str
+) -> float:
+    """Test whether everything that a mechanism of a model explains is significant.
+
+    With G the Gram matrix of its columns given all other terms of the model, b their
+    score and S the prior variances, b'(G + S^-1)^-1 b is a weighted sum of squares of
+    standard normal numbers if the mechanism is absent. Its distribution is approximated
+    by a scaled chi-square of the same mean and variance (Satterthwaite 1946).
+    """
+    is_own, gram, score = _scale_statistics(problem, model, mechanism)
+    complement = gram[np.ix_(~is_own, ~is_own)] + np.eye((~is_own).sum())
+    cross = gram[np.ix_(~is_own, is_own)]
+    solution = solve_positive_definite(
+        complement, np.column_stack([cross, score[~is_own]])
+    )
+    conditional = gram[np.ix_(is_own, is_own)] - cross.T @ solution[:, :-1]
+    conditional_score = score[is_own] - cross.T @ solution[:, -1]
+    values, vectors = np.linalg.eigh(conditional)
+    values = np.clip(values, 0.0, None)
+    shares = values / (1.0 + values)
+    if not shares.any():
+        return 1.0
+    squares = ((vectors.T @ conditional_score) ** 2 / (1.0 + values)).sum()
+    squares /= max(predict_reduced_chi_square(problem, model), 1.0)
+    scale = (shares**2).sum() / shares.sum()
+    return float(chi2.sf(squares / scale, shares.sum() / scale))
+
+
+def _scale_statistics(
+    problem: SearchProblem, model: ScoredModel, mechanism: str
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Whether a column of a model is one of a mechanism, (D,) of bool, with the Gram
+    matrix (D, D) and the score (D,) of the columns in units of their prior
+    deviations."""
+    columns, prior_std = problem.scaled_columns(model.term_indices, model.scales)
+    _, is_own = problem.scaled_columns(
+        model.term_indices,
+        [problem.terms[index].mechanism == mechanism for index in model.term_indices],
+    )
+    index = problem.statistics.nearest(model.pose_error_rad)
+    statistics = problem.statistics.at(slice(index, index + 1))
+    gram = prior_std[:, None] * statistics.gram_blocks(columns)[0] * prior_std
+    return is_own.astype(bool), gram, prior_std * statistics.score[0, columns]
+
+
+@dataclass(frozen=True)
+class _Target:
+    """Displacements of a mechanism of a model, which another one may reproduce.
+
+    Attributes
+    ----------
+    problem
+        The linearised problem.
+    index
+        Index of the pose error of the model.
+    columns, coefficients
+        (d,), of the mechanism, in plausible sizes.
+    companions
+        Indices of the other terms of the model, which may take any plausible size.
+    """
+
+    problem: SearchProblem
+    index: int
+    columns: np.ndarray
+    coefficients: np.ndarray
+    companions: tuple[int, ...]
+
+    @classmethod
+    def of_mechanism(
+        cls, problem: SearchProblem, model: ScoredModel, mechanism: str
+    ) -> _Target:
+        """The displacements of a mechanism at the most probable sizes of a model."""
+        columns, coefficients, index = problem.find_mode(model)
+        is_own = _scale_statistics(problem, model, mechanism)[0]
+        companions = tuple(
+            number
+            for number in model.term_indices
+            if problem.terms[number].mechanism != mechanism
+        )
+        return cls(problem, index, columns[is_own], coefficients[is_own], companions)
+
+    def is_reproduced_by(self, indices: Sequence[int]) -> bool:
+        """Whether terms of one mechanism reproduce the displacements within the
+        tolerance of laws."""
+        alone = self._build_system([])
+        tolerance = self.problem.settings.law_tolerance**2
+        largest = tolerance * alone.compute_residual(alone.forced)
+        system = self._build_system(self._choose_variants(indices))
+        selected = system.forced.copy()
+        for _ in self.columns:
+            gains = system.compute_gains(selected)
+            best = int(np.argmax(gains))
+            if gains[best] <= 0.0:
+                return False
+            selected[best] = True
+            if system.compute_residual(selected) <= largest:
+                return True
+        return False
+
+    def _choose_variants(self, indices: Sequence[int]) -> list[int]:
+        """Of the variants at each location, choose the one that reproduces most."""
+        variants: dict[object, list[int]] = defaultdict(list)
+        for index in indices:
+            variants[self.problem.terms[index].slot].append(index)
+        return [
+            min(group, key=self._compute_term_residual) for group in variants.values()
+        ]
+
+    def _compute_term_residual(self, index: int) -> float:
+        system = self._build_system([index])
+        return system.compute_residual(np.ones_like(system.forced))
+
+    def _build_system(self, indices: Sequence[int]) -> _RidgeSystem:
+        """Build the equations by which the companions and further terms reproduce the
+        displacements."""
+        problem = self.problem
+        numbers = [*self.companions, *indices]
+        columns, prior_std = problem.scaled_columns(
+            numbers,
+            [problem.grid.root_mean_square(problem.terms[index]) for index in numbers],
+        )
+        count = len(self.columns)
+        statistics = problem.statistics.at(slice(self.index, self.index + 1))
+        gram = statistics.gram_blocks(np.concatenate([self.columns, columns]))[0]
+        products = gram[:, :count] @ self.coefficients
+        forced = np.zeros(len(columns), bool)
+        companions = [problem.terms[index].columns for index in self.companions]
+        forced[: sum(map(len, companions))] = True
+        return _RidgeSystem(
+            total=float(self.coefficients @ products[:count]),
+            products=prior_std * products[count:],
+            gram=prior_std[:, None] * gram[count:, count:] * prior_std,
+            forced=forced,
+        )
+
+
+@dataclass(frozen=True)
+class _RidgeSystem:
+    """Ridge regression of displacements on columns in units of their prior deviations.
+
+    Attributes
+    ----------
+    total
+        Sum of squares of the displacements.
+    products
+        (D,) products of the columns with the displacements.
+    gram
+        (D, D) products of the columns.
+    forced
+        (D,) of bool, columns that every regression has.
+    """
+
+    total: float
+    products: np.ndarray
+    gram: np.ndarray
+    forced: np.ndarray
+
+    def compute_residual(self, selected: np.ndarray) -> float:
+        """Sum of squares that the selected columns leave."""
+        coefficients = self._solve(selected)
+        explained = coefficients @ (2.0 * self.products - self.gram @ coefficients)
+        return float(self.total - explained)
+
+    def compute_gains(self, selected: np.ndarray) -> np.ndarray:
+        """Squares that each further column explains by itself, (D,); zero for the
+        selected ones."""
+        gradient = self.products - self.gram @ self._solve(selected)
+        gains = gradient**2 / (1.0 + np.diag(self.gram))
+        return np.where(selected, 0.0, gains)
+
+    def _solve(self, selected: np.ndarray) -> np.ndarray:
+        coefficients = np.zeros(len(self.products))
+        precision = self.gram[np.ix_(selected, selected)] + np.eye(selected.sum())
+        coefficients[selected] = solve_positive_definite(
+            precision, self.products[selected]
+        )
+        return coefficients
