@@ -83,7 +83,7 @@ def test_verdict_has_every_key_of_the_contract(diagnosed):
     )
     assert set(map(len, verdict["compliance_urad_per_Nm"].values())) == {6}
     assert (
-        settings["alarm_level"]["value"] == 0.02 and settings["alarm_level"]["reason"]
+        settings["alarm_level"]["value"] == 0.01 and settings["alarm_level"]["reason"]
     )
     (effect,) = verdict["effects"]
     assert (effect["name"], effect["joints"], effect["alternatives"]) == (
