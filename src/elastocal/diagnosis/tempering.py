@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from elastocal.diagnosis.search import Posterior, SearchProblem
+    from elastocal.diagnosis.settings import Settings
     from elastocal.diagnosis.verdict import Hypothesis
 
 
@@ -86,13 +87,7 @@ def temper_hypotheses(
     power = compute_power(squares, settings.law_tolerance, settings.confusable_share)
     probabilities = np.array([hypothesis.probability for hypothesis in missing])
     log_prior = np.array(
-        [
-            sum(
-                logit(get_presence_probability(name, settings))
-                for name in hypothesis.mechanisms
-            )
-            for hypothesis in missing
-        ]
+        [_compute_log_prior(hypothesis, settings) for hypothesis in missing]
     )
     log_evidence = np.log(probabilities) - log_prior
     log_odds = log_prior + power * log_evidence
@@ -103,3 +98,11 @@ def temper_hypotheses(
     ]
     kept = [hypothesis for hypothesis in hypotheses if hypothesis not in missing]
     return tuple(sorted([*tempered, *kept], key=lambda entry: -entry.probability))
+
+
+def _compute_log_prior(hypothesis: Hypothesis, settings: Settings) -> float:
+    """Log prior odds of a set of mechanisms against its absence."""
+    return sum(
+        float(logit(get_presence_probability(name, settings)))
+        for name in hypothesis.mechanisms
+    )

@@ -178,14 +178,7 @@ def _state_evidence(
     kept_average = average
     if kept_model is not named_model:
         kept_average = average_models(design, posterior, kept_model, owners)
-    observations = result.case.observations
-    poses = int(observations.cluster.max()) + 1
-    effects = state_effects(
-        evidence,
-        result.full_model,
-        allow_for_laws(design.problem, named_model, average, poses),
-        observations,
-    )
+    effects = _state_widened_effects(result, evidence, average)
     between_models = compute_between_model_squares(
         design.problem, posterior, kept_model
     )
@@ -210,6 +203,19 @@ def _state_evidence(
         untestable=design.untestable,
         warnings=_warn_of_search(evidence, result.full_model, effects, settings),
     )
+
+
+def _state_widened_effects(
+    result: TrainingResult, evidence: Evidence, average: ModelAverage
+) -> tuple[Effect, ...]:
+    """State the effects with intervals that allow for laws which are only nearly
+    true."""
+    observations = result.case.observations
+    poses = int(observations.cluster.max()) + 1
+    widened = allow_for_laws(
+        evidence.design.problem, evidence.named_model, average, poses
+    )
+    return state_effects(evidence, result.full_model, widened, observations)
 
 
 def _warn_of_search(

@@ -250,42 +250,37 @@ def _choose_verdict(
     nothing = tempered[()]
     verdict, leading = leaders
     best = tempered[leading or ()]
-    competitors = [
-        hypothesis
-        for hypothesis in hypotheses
-        if hypothesis.mechanisms and hypothesis != best
-    ]
+    competitors = [entry for entry in hypotheses if entry not in (best, nothing)]
     state_alone, stated = _minimize_expected_loss([best, *competitors], settings)
     is_named = state_alone and verdict == CLASS and OTHER not in best.mechanisms
     if is_named:
         stated = [best]
     if best is nothing or _sum_probabilities(stated) < nothing.probability:
         stated = []
+        best = nothing
     alternatives: dict[str, tuple[str, ...]] = {}
     if verdict == UNEXPLAINED or not stated:
         verdict = UNEXPLAINED
-        probability = sum(
-            hypothesis.probability
-            for hypothesis in hypotheses
-            if hypothesis.mechanisms and not hypothesis.named
-        )
-        if not stated:
-            best = nothing
-            probability += nothing.probability
-    elif is_named:
-        verdict = NAMED
-        # Rounding may carry the sum of the models beyond one.
-        probability = min(best.probability, 1.0)
-        alternatives = dict.fromkeys(best.named, ())
+        probability = _sum_unnamed(hypotheses)
+        if stated:
+            probability -= nothing.probability
     else:
-        probability = min(_sum_probabilities(stated), 1.0)
+        verdict = NAMED if is_named else verdict
+        probability = _sum_probabilities(stated)
         alternatives = {
             name: _find_alternatives(name, best, stated) for name in best.named
         }
+    # Rounding may carry the sum of the models beyond one.
+    probability = min(probability, 1.0)
     conclusion = Conclusion(
         verdict, hypotheses, best, alternatives, mechanisms, probability
     )
     return conclusion, stated
+
+
+def _sum_unnamed(hypotheses: Sequence[Hypothesis]) -> float:
+    """Sum the probabilities of the hypotheses without a mechanism of the catalogue."""
+    return _sum_probabilities([entry for entry in hypotheses if not entry.named])
 
 
 def _add_confounded_mechanisms(
