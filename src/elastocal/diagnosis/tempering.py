@@ -91,6 +91,15 @@ def temper_hypotheses(
     )
     log_evidence = np.log(probabilities) - log_prior
     log_odds = log_prior + power * log_evidence
+    # A further mechanism beside those that lead is no other law for what these explain.
+    # Therefore its odds stay those of the evidence.
+    leader = int(np.argmax(probabilities))
+    extends = [
+        set(hypothesis.mechanisms) > set(missing[leader].mechanisms)
+        for hypothesis in missing
+    ]
+    ratios = np.log(probabilities / probabilities[leader])
+    log_odds = np.where(extends, log_odds[leader] + ratios, log_odds)
     shares = np.exp(log_odds - logsumexp(log_odds))
     tempered = [
         replace(hypothesis, probability=float(probabilities.sum() * share))

@@ -1,0 +1,76 @@
+"""How often is a stated probability right? On simulated robots of the blind benchmark's
+development size, of which `--cases` are drawn by a seed.
+
+Prints the reliability diagram, wrong single names, the names that are right alone, and
+the joints of named effects, each with its 95 % interval. Choose settings with one seed
+and judge them with another.
+"""
+
+import argparse
+import tempfile
+from pathlib import Path
+
+import pandas as pd
+
+from elastocal.diagnosis.diagnose import diagnose
+from elastocal.diagnosis.settings import Settings
+from elastocal.io.documents import read_document
+from elastocal.io.json_files import read_json
+from elastocal.loop.whole import read_cases
+from elastocal_proof.blind.cases import list_cases, write_sealed_case
+from elastocal_proof.blind.locations import list_locations
+from elastocal_proof.blind.scores import build_case_row, compute_rate
+from elastocal_proof.blind.summary import tabulate_reliability
+
+CONFIG = Path(__file__).resolve().parents[1] / "config"
+
+
+def diagnose_cases(count, seed, folder):
+    """Make and diagnose cases; return a row of scores and the locations of each."""
+    plan = read_document(CONFIG / "blind.yaml")
+    robots = CONFIG / "robots"
+    rows = []
+    locations = []
+    for case in list_cases(plan, "development", seed)[:count]:
+        write_sealed_case(case, folder, folder / "sealed", robots)
+        training, _ = read_cases((folder / case.name).as_posix(), robots.as_posix())
+        verdict = diagnose(training, Settings(), seed).document
+        truth = read_json(folder / "sealed" / f"{case.name}.json")
+        rows.append(build_case_row(plan, truth, verdict))
+        locations += list_locations(truth, verdict)
+    return pd.DataFrame(rows), pd.DataFrame(locations)
+
+
+def print_rate(words, hits):
+    """Print a share with its interval."""
+    rate = compute_rate(hits)
+    print(
+        f"{words}: {rate['hits']} of {rate['cases']},"
+        f" {rate['rate']:.3f} ({rate['low']:.3f}-{rate['high']:.3f})"
+    )
+
+
+def main():
+    """Print the figures of a number of cases."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cases", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=9301)
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        cases, locations = diagnose_cases(arguments.cases, arguments.seed, Path(folder))
+    reliability = tabulate_reliability(cases)
+    print(reliability[reliability.group == "all"].round(3).to_string(index=False))
+    outside = cases[cases.group == "outside"]
+    named = cases[cases.verdict == "named"]
+    print_rate("wrong single name, cause outside the catalogue", outside.wrong_name)
+    print_rate("wrong single name, all cases", cases.wrong_name)
+    print_rate("right name, of those stated alone", named.named_right)
+    print_rate("alarms without an effect", cases[cases.truth == "none"].detected)
+    if len(locations):
+        stated = locations[locations.stated]
+        print_rate("joints of named effects, all right", stated.right)
+        print_rate("joints of named effects, all wrong", stated.wrong)
+
+
+if __name__ == "__main__":
+    main()
