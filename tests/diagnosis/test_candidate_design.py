@@ -125,7 +125,7 @@ def test_the_smallest_size_is_the_first_that_would_be_found_with_a_power_of_a_ha
     freedom, at each of the scales."""
     problem = design_of(campaign).problem
     terms = [term for term in problem.terms if term.candidate]
-    critical = chi2.isf(SETTINGS.alarm_level / len(terms), 1)
+    critical = chi2.isf(SETTINGS.detection_level / len(terms), 1)
     assert ncx2.sf(critical, 1, critical) == pytest.approx(0.5, abs=0.01)
     gram = problem.statistics.gram.copy()
     columns = terms[0].columns

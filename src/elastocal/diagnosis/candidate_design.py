@@ -413,7 +413,7 @@ def find_smallest_detectable_sizes(
     (number of terms,) int, index of the scale; the number of scales if even the largest
     one is too small to be detected
     """
-    critical = chdtri(1, settings.alarm_level / max(len(terms), 1))
+    critical = chdtri(1, settings.detection_level / max(len(terms), 1))
     largest_eigenvalue = np.zeros(len(terms))
     for block in TermBlock.group(statistics.at(slice(1)), terms):
         largest_eigenvalue[block.numbers] = block.eigenvalues[0].max(axis=1)

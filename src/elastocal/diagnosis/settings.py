@@ -34,6 +34,7 @@ class Settings:
     it has this value."""
 
     alarm_level: float = _DEFAULT.alarm_level
+    detection_level: float = _DEFAULT.detection_level
     alarm_draws: int = _DEFAULT.alarm_draws
     mechanism_probability: float = _DEFAULT.mechanism_probability
     gravity_probability: float = _DEFAULT.gravity_probability
