@@ -25,7 +25,8 @@ WRENCH = np.array([100.0, -200.0, 300.0, 40.0, 50.0, -60.0])
 @pytest.mark.parametrize("chain", [TURNED, TRACK])
 def test_pinocchio_gives_the_regressor_of_the_package(chain):
     joints = 4
-    limits = [[-180.0, 180.0]] * joints
+    # A prismatic joint takes them as metres.
+    limits = [[-90.0, 90.0]] * joints
     compliance = [0.5 + j for j in range(joints)]
     document = {
         "name": "arm",

@@ -24,7 +24,7 @@ def folders_and_verdicts(kuka, tmp_path_factory):
     angle that it reports; in the other nothing is missing, so that the p-value of the
     alarm depends on the seed."""
     results = {}
-    for verdict, offset in (("named", 1e-3), ("adequate", 0.0)):
+    for verdict, offset in (("class", 1e-3), ("adequate", 0.0)):
         folder = tmp_path_factory.mktemp(verdict) / "made"
         table = make_table(kuka, "made", plan=PLAN, offset_of_joint_3=offset)
         folder = make_folder(folder, kuka, table=table)
@@ -32,7 +32,7 @@ def folders_and_verdicts(kuka, tmp_path_factory):
         document = json.loads(json.dumps(document, allow_nan=False))
         assert document["verdict"] == verdict
         results[verdict] = folder, document
-    effects = results["named"][1]["effects"]
+    effects = results["class"][1]["effects"]
     assert [effect["name"] for effect in effects] == ["joint_offset"]
     p_value = results["adequate"][1]["probabilities"]["alarm_p_value"]
     assert 0.02 < p_value < 0.98
@@ -58,7 +58,7 @@ def assert_equal_documents(first, second, path="verdict"):
         assert first == second, path
 
 
-@pytest.mark.parametrize("verdict", ["named", "adequate"])
+@pytest.mark.parametrize("verdict", ["class", "adequate"])
 def test_rules_with_tables_between_the_steps_come_to_the_same_verdict(
     verdict, folders_and_verdicts, tmp_path
 ):

@@ -75,7 +75,7 @@ def test_a_pose_may_be_the_number_in_a_name(tmp_path):
         (
             2,
             "3;0;0;A;1;2;3;0",
-            ["pose 3, load 0, repeat 0, target A, which", "sheet.csv"],
+            ["pose 3, load 0, repeat 0, target A, which"],
         ),
         (2, "2;0;0;B;1;2;3;0", ["target B, which", "--target"]),
         (2, "2.5;0;0;A;1;2;3;0", ["'2.5'", "the number of a pose"]),

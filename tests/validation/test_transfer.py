@@ -119,7 +119,8 @@ def test_variances_of_fitted_poses_are_those_without_the_measurements_of_the_pos
         fit.model, fit.estimate, fitted_poses, fit.conditions
     ).sensitivities
     white = fit.whiten(sensitivities)
-    prior_precision = [parameter.plausible**-2.0 for _, parameter in fit.parameters]
+    plausible = [parameter.plausible for _, parameter in fit.parameters]
+    prior_precision = np.minimum(plausible, fit.prior_std) ** -2.0
     for pose in range(9):
         in_pose = fitted_poses.cluster == pose
         variances = compute_variances(

@@ -33,7 +33,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.refit import predict_reduced_chi_square
@@ -104,7 +104,7 @@ def compute_joint_p_value(
     squares = ((vectors.T @ conditional_score) ** 2 / (1.0 + values)).sum()
     squares /= max(predict_reduced_chi_square(problem, model), 1.0)
     scale = (shares**2).sum() / shares.sum()
-    return float(chi2.sf(squares / scale, shares.sum() / scale))
+    return float(chdtrc(shares.sum() / scale, squares / scale))
 
 
 def _scale_statistics(
