@@ -231,8 +231,9 @@ def test_a_lost_held_out_row_changes_neither_the_training_poses_nor_the_verdict(
 
 
 @pytest.mark.slow
-def test_a_lost_held_out_row_changes_none_of_200_verdicts(tmp_path):
-    for number in range(200):
+def test_a_lost_held_out_row_changes_none_of_40_verdicts(tmp_path):
+    """If one verdict in fourteen changed, the test would find it with 95 %."""
+    for number in range(40):
         clean, damaged, lost_row = make_clean_and_damaged(
             tmp_path / str(number), number
         )
