@@ -125,14 +125,17 @@ def test_errors_of_a_campaign_are_those_of_its_averaged_residuals(run_with_error
 
 
 @pytest.mark.parametrize(
-    ("row", "expected"),
+    ("column", "row", "expected"),
     [
-        (0, ["errors of fitted poses, before"]),
-        (3, 2 * ["errors of held-out poses, before"]),
+        ("after_dx", 0, ["errors of fitted poses, after"]),
+        ("after_dx", 3, 2 * ["errors of held-out poses, after"]),
+        ("before_dx", 3, ["errors of held-out poses, before"]),
     ],
 )
-def test_one_altered_residual_changes_the_errors(run_with_errors, row, expected):
+def test_one_altered_residual_changes_the_errors(
+    run_with_errors, column, row, expected
+):
     run = run_with_errors
     file = f"{CAMPAIGN}/residuals.parquet"
-    with altered(run.folder, file, ("before_dx", row), lambda value: value + 1e-6):
+    with altered(run.folder, file, (column, row), lambda value: value + 1e-6):
         assert find_failures(run) == expected

@@ -147,7 +147,8 @@ def altered(folder, file, address, change):
     elif file.endswith(".csv"):
         table = pd.read_csv(paths[0])
         column, row = address
-        table.loc[row, column] = change(table.loc[row, column])
+        address = table.index[row], column
+        table.loc[address] = change(table.loc[address])
         table.to_csv(paths[0], index=False)
     else:
         table = pq.ParquetFile(paths[0]).read()

@@ -354,24 +354,19 @@ def _compute_extended_row(run: FinishedRun, robot: str, title: str) -> dict[str,
 
 
 def check_errors(run: FinishedRun, file: str, campaign: str) -> Iterator[Finding]:
-    """Errors of the declared and the final model at fitted and held-out poses, from the
-    residuals of every row."""
-    table = run.table(file)
-    final = table.iloc[-1]
-    declared = table[table["kind"] == "declared"].iloc[0]
-    for name, row in (("before", declared), ("after", final)):
-        for group, prefix in (("fitted", "train"), ("held-out", "heldout")):
-            expected = _summarize_residuals(run, campaign, name, group)
-            stated = row[[f"{prefix}_{quantity}" for quantity in expected]]
-            checked = f"errors of {group} poses, {name}"
-            yield compare(
-                checked,
-                _PANDAS,
-                stated,
-                list(expected.values()),
-                _NINE_DIGITS,
-                _POSITIONS_M,
-            )
+    """Errors of the final model at fitted and held-out poses, from the residuals of
+    every row."""
+    final = run.table(file).iloc[-1]
+    for group, prefix in (("fitted", "train"), ("held-out", "heldout")):
+        expected = _summarize_residuals(run, campaign, "after", group)
+        yield compare(
+            f"errors of {group} poses, after",
+            _PANDAS,
+            final[[f"{prefix}_{quantity}" for quantity in expected]],
+            list(expected.values()),
+            _NINE_DIGITS,
+            _POSITIONS_M,
+        )
 
 
 def check_verdict(run: FinishedRun, file: str, campaign: str) -> Iterator[Finding]:
