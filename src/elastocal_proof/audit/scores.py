@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -222,15 +223,49 @@ def check_table3(run: FinishedRun, file: str) -> Iterator[Finding]:
         yield compare(f"row of {name}", "pandas", stated, expected, _NINE_DIGITS)
 
 
+@dataclass(frozen=True)
+class _TabulatedScore:
+    """A score of Table 4.
+
+    Attributes
+    ----------
+    column : column of the metrics
+    factor : from the unit of the metrics to that of the table
+    limit : in the unit of the table
+    score, needed : columns of the table
+    """
+
+    column: str
+    factor: float
+    limit: float
+    score: str
+    needed: str
+
+
 def check_table4(run: FinishedRun, file: str) -> Iterator[Finding]:
     """Every score at the tables' length, and the first length within the limits, from
     the metrics."""
-    tables = run.configuration["tables"]
+    length = run.configuration["tables"]["length"]
+    scores = _list_tabulated_scores(run.configuration["tables"])
+    for _, row in run.table(file).iterrows():
+        cell = _read_cell(run, row["robot"], row["strategy_file"])
+        expected: list[float] = []
+        stated: list[float] = []
+        for score in scores:
+            expected += _compute_tabulated_score(score, cell, length)
+            std_error = row[f"{score.score}_std_error"]
+            stated += [row[score.score], std_error, row[score.needed]]
+        name = f"row of {row['robot']}, {row['strategy']}"
+        yield compare(name, "pandas", stated, expected, _NINE_DIGITS)
+
+
+def _list_tabulated_scores(tables: Mapping[str, Any]) -> list[_TabulatedScore]:
+    """List the scores of Table 4 by the settings of the tables."""
     length = tables["length"]
     percent = tables["k_sigma_limit_percent"]
     micrometres = tables["deviation_limit_um"]
     scores = [
-        (
+        _TabulatedScore(
             f"k_sigma{end}",
             1.0,
             percent,
@@ -239,28 +274,25 @@ def check_table4(run: FinishedRun, file: str) -> Iterator[Finding]:
         )
         for end in ("", "_fixed_joints")
     ]
-    scores.append(
-        (
-            "deviation",
-            _MICRO,
-            micrometres,
-            f"dev_{length}_um",
-            f"n_dev_{micrometres:g}_um",
-        )
+    deviation = _TabulatedScore(
+        "deviation",
+        _MICRO,
+        micrometres,
+        f"dev_{length}_um",
+        f"n_dev_{micrometres:g}_um",
     )
-    for _, row in run.table(file).iterrows():
-        cell = _read_cell(run, row["robot"], row["strategy_file"])
-        expected = []
-        stated = []
-        for column, factor, limit, score, needed in scores:
-            curve = factor * cell[column]
-            within = curve.index[curve.abs() <= limit]
-            std_error = factor * cell[f"{column}_std_error"].loc[length]
-            expected += [curve.loc[length], std_error]
-            expected.append(within[0] if len(within) else np.inf)
-            stated += [row[score], row[f"{score}_std_error"], row[needed]]
-        name = f"row of {row['robot']}, {row['strategy']}"
-        yield compare(name, "pandas", stated, expected, _NINE_DIGITS)
+    return [*scores, deviation]
+
+
+def _compute_tabulated_score(
+    score: _TabulatedScore, cell: pd.DataFrame, length: int
+) -> list[float]:
+    """Compute a score, its standard error, and the first length within its limit, which
+    is infinite if there is none."""
+    curve = score.factor * cell[score.column]
+    std_error = score.factor * cell[f"{score.column}_std_error"].loc[length]
+    within = curve.index[curve.abs() <= score.limit]
+    return [curve.loc[length], std_error, within[0] if len(within) else np.inf]
 
 
 def check_table_for_people(
