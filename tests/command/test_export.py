@@ -175,3 +175,14 @@ def test_an_export_may_be_repeated_but_not_over_an_edited_file(
     robot.write_text(robot.read_text() + "# mine\n")
     assert "changed since" in refusal(*arguments)
     assert elastocal(*arguments, "--force").exit_code == 0
+
+
+def test_an_export_into_a_folder_that_the_user_has_linked_is_written_there(
+    copied_checkout, elastocal, tmp_path
+):
+    """A link that the user names is no link that somebody else has placed."""
+    (tmp_path / "elsewhere").mkdir()
+    Path("out").symlink_to(tmp_path / "elsewhere")
+    result = elastocal("export", "made", "--output", Path("out").absolute())
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "elsewhere" / "robot.yaml").is_file()

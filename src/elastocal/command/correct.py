@@ -109,7 +109,9 @@ def correct(
     console = Console(stderr=True)
     program = _plan_program(output, language, axes)
     files = [output, program.path] if program else [output]
-    _check_output(files)
+    if not output.parent.is_dir():
+        allowed = "a file in a folder that is there"
+        raise InputError(output, "", "no such folder", allowed)
     campaign = load_diagnosed_campaign(folder)
     inputs: list[str | Path] = [*campaign.folder.files(), path]
     check_replaceable(files, inputs, find_workplace(), force=force)
@@ -212,18 +214,6 @@ def _plan_program(output: Path, language: str, axes: str) -> _Program | None:
         return None
     path = output.with_suffix(controller.suffix)
     return _Program(controller, path, check_name(controller, path), axes)
-
-
-def _check_output(files: list[Path]) -> None:
-    """Refuse places where the files cannot be written, before the campaign is read."""
-    from elastocal.io.atomic_writes import check_places
-
-    check_places(*files)
-    output = files[0]
-    if not output.parent.is_dir():
-        raise InputError(
-            output, "", "no such folder", "a file in a folder that is there"
-        )
 
 
 def _write_targets(

@@ -47,7 +47,7 @@ def check_replaceable(
         case.
     """
     outputs = list(outputs)
-    check_places(*outputs, top / WRITTEN_FILES, top=top)
+    check_places(*outputs, top / WRITTEN_FILES)
     if force:
         return
     written = _read_written_files(top)
