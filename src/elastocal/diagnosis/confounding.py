@@ -88,7 +88,8 @@ def compute_joint_p_value(
     standard normal numbers if the mechanism is absent. Its distribution is approximated
     by a scaled chi-square of the same mean and variance (Satterthwaite 1946).
     """
-    is_own, gram, score = _scale_statistics(problem, model, mechanism)
+    is_own = _find_columns(problem, model, mechanism)
+    gram, score = _scale_statistics(problem, model)
     complement = gram[np.ix_(~is_own, ~is_own)] + np.eye((~is_own).sum())
     cross = gram[np.ix_(~is_own, is_own)]
     solution = solve_positive_definite(
@@ -107,21 +108,25 @@ def compute_joint_p_value(
     return float(chdtrc(shares.sum() / scale, squares / scale))
 
 
-def _scale_statistics(
+def _find_columns(
     problem: SearchProblem, model: ScoredModel, mechanism: str
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Whether a column of a model is one of a mechanism, (D,) of bool, with the Gram
-    matrix (D, D) and the score (D,) of the columns in units of their prior
-    deviations."""
+) -> np.ndarray:
+    """Find the columns of a model that are those of a mechanism, (D,) of bool."""
+    terms = [problem.terms[index] for index in model.term_indices]
+    is_own = np.array([term.mechanism == mechanism for term in terms], bool)
+    return np.repeat(is_own, [len(term.columns) for term in terms])
+
+
+def _scale_statistics(
+    problem: SearchProblem, model: ScoredModel
+) -> tuple[np.ndarray, np.ndarray]:
+    """Gram matrix (D, D) and score (D,) of the columns of a model in units of their
+    prior deviations."""
     columns, prior_std = problem.scaled_columns(model.term_indices, model.scales)
-    _, is_own = problem.scaled_columns(
-        model.term_indices,
-        [problem.terms[index].mechanism == mechanism for index in model.term_indices],
-    )
     index = problem.statistics.nearest(model.pose_error_rad)
     statistics = problem.statistics.at(slice(index, index + 1))
     gram = prior_std[:, None] * statistics.gram_blocks(columns)[0] * prior_std
-    return is_own.astype(bool), gram, prior_std * statistics.score[0, columns]
+    return gram, prior_std * statistics.score[0, columns]
 
 
 @dataclass(frozen=True)
@@ -152,7 +157,7 @@ class _Target:
     ) -> _Target:
         """The displacements of a mechanism at the most probable sizes of a model."""
         columns, coefficients, index = problem.find_mode(model)
-        is_own = _scale_statistics(problem, model, mechanism)[0]
+        is_own = _find_columns(problem, model, mechanism)
         companions = tuple(
             number
             for number in model.term_indices

@@ -178,7 +178,7 @@ def weigh_gross_errors(
     sampled, observations = _sample_rows(case, suspects, settings)
     problem = _Linearization.about(fitted, noise, case, observations, settings)
     is_suspect = suspects[sampled]
-    hopeless = problem.distance > settings.gross_error_reach * problem.reach
+    hopeless = problem.distance > settings.gross_error_reach * problem.compute_reach()
     weighed = np.flatnonzero(is_suspect & ~hopeless)
     weighed = weighed[np.argsort(problem.distance[weighed])][:_MOST_SUSPECTS]
     if not len(weighed):
@@ -186,8 +186,9 @@ def weigh_gross_errors(
     # Rows that are certainly wrong take no part.
     kept = ~is_suspect
     kept[weighed] = True
-    observations = select_states(observations, kept)
-    problem = _Linearization.about(fitted, noise, case, observations, settings)
+    if not kept.all():
+        observations = select_states(observations, kept)
+        problem = _Linearization.about(fitted, noise, case, observations, settings)
     basis = problem.build_gross_errors(np.flatnonzero(is_suspect[kept]))
     probability = suspects.astype(float)
     probability[sampled[kept]] = _search_with_gross_errors(problem.design, basis)
@@ -209,14 +210,10 @@ class _Linearization:
         Everything that the fit may lack.
     residual
         (M, c), in standard deviations of the sensor.
-    reach
-        (M,), standard deviation of the sum of everything that the catalogue may add to
-        a row, in standard deviations of the noise; at least one.
     """
 
     design: CandidateDesign
     residual: np.ndarray
-    reach: np.ndarray
 
     @classmethod
     def about(
@@ -232,16 +229,20 @@ class _Linearization:
         design = build_candidate_design(
             reference, observations, list(case.candidates.values()), settings
         )
-        grid = SizeGrid.from_settings(settings)
-        variance = np.exp(grid.log_weights) @ grid.scales**2
-        squares = (design.rows.candidates.dense() ** 2).sum(axis=(1, 2))
-        residual = reference.residual / noise.sensor_std(observations.rows)
-        return cls(design, residual, np.sqrt(1.0 + variance * squares))
+        return cls(design, reference.residual / noise.sensor_std(observations.rows))
 
     @property
     def distance(self) -> np.ndarray:
         """Lengths of the residuals, (M,)."""
         return np.linalg.norm(self.residual, axis=1)
+
+    def compute_reach(self) -> np.ndarray:
+        """Compute the standard deviation of the sum of everything that the catalogue may
+        add to a row, (M,), in standard deviations of the noise; at least one."""
+        grid = SizeGrid.from_settings(self.design.settings)
+        variance = np.exp(grid.log_weights) @ grid.scales**2
+        squares = (self.design.rows.candidates.dense() ** 2).sum(axis=(1, 2))
+        return np.sqrt(1.0 + variance * squares)
 
     def build_gross_errors(self, suspects: np.ndarray) -> GrossErrorBasis:
         """Build the terms of suspect rows, (k,) of int, and of their poses.

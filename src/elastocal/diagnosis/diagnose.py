@@ -591,17 +591,17 @@ def _is_linear(start: _SearchRound, evidence: Evidence, settings: Settings) -> b
 def _depends_on_torque(evidence: Evidence) -> bool:
     """Whether one of the two most probable sets of mechanisms has a law that is not
     linear in the load."""
-    leading = sorted(
-        evidence.conclusion.hypotheses,
-        key=lambda hypothesis: -hypothesis.probability,
-    )[:2]
+    term_indices: set[int] = set()
+    # The most probable hypotheses come first.
+    for hypothesis in evidence.conclusion.hypotheses[:2]:
+        if hypothesis.mechanisms:
+            model = evidence.posterior.models[hypothesis.model]
+            term_indices.update(model.term_indices)
     terms = evidence.design.problem.terms
+    candidates = [terms[index].candidate for index in term_indices]
     return any(
         candidate is not None and candidate.nonlinear_in_load
-        for hypothesis in leading
-        if hypothesis.mechanisms
-        for index in evidence.posterior.models[hypothesis.model].term_indices
-        for candidate in [terms[index].candidate]
+        for candidate in candidates
     )
 
 
