@@ -33,6 +33,7 @@ from synthetic import (
 )
 
 from elastocal.campaigns.campaign import Target
+from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.elastic import joint_compliance
 from elastocal.fitting import least_squares
@@ -705,3 +706,7 @@ def test_a_joint_without_any_compliance_still_bears_declared_masses(kuka):
     assert fitted.converged
     compliance = get_joint_compliances(fitted.model, fitted.estimate)
     np.testing.assert_allclose(compliance, kuka.compliance, rtol=0.05)
+
+
+def test_a_parameter_counts_as_identified_by_the_same_share_everywhere():
+    assert Settings().prior_share == least_squares.IDENTIFIED_SHARE

@@ -57,9 +57,7 @@ _MAX_ROTATION_RAD = 5 * IMPLAUSIBLE_RAD
 # itself known to a factor of five.
 _MAX_NOMINAL_RATIO = 5.0
 _MAX_USUAL_RATIO = 25.0
-# Share of its prior variance above which a compliance counts as not identified, and
-# standard errors by which one is far off.
-_IDENTIFIED_SHARE = 0.5
+# Standard errors by which a compliance is far off.
 _NEGATIVE_STD_ERRORS = 2.0
 _RIGID = (
     "the robot file states no joint compliances: the joints are taken as rigid, and do"
@@ -413,9 +411,7 @@ def warn_of_compliances(fitted: Fit) -> list[str]:
     std_error = np.sqrt(np.diag(fitted.covariance))[indices]
     compliance = get_joint_compliances(model, fitted.estimate)
     nominal = model.nominal_compliance
-    # The prior says more of an unidentified compliance than the measurements do, so
-    # such a number is no reason for a warning.
-    is_identified = std_error**2 < _IDENTIFIED_SHARE * fitted.prior_std[indices] ** 2
+    is_identified = fitted.identified[indices]
     is_negative = compute_negative_compliances(fitted) > _NEGATIVE_STD_ERRORS
     ratio = _MAX_USUAL_RATIO
     reference = "usual for such a robot"

@@ -35,9 +35,6 @@ if TYPE_CHECKING:
 # reach, plus this many standard errors.
 _IMPLAUSIBLE_FACTOR = 3.0
 _STD_ERRORS = 2.0
-# Share of its prior variance above which a parameter counts as not identified, so that
-# its value says nothing.
-_IDENTIFIED_SHARE = 0.5
 # Units of masses and of first moments, and of their products with a compliance.
 _PRODUCT_UNITS = {"kg": "rad kg/(N m)", "kg m": "rad kg m/(N m)"}
 
@@ -312,11 +309,10 @@ def _generate_estimates(
     # Shapes come last and are not among the parameters.
     if fitted.beyond_bound is not None:
         values += fitted.beyond_bound[indices[: len(values)]]
-    for estimate in zip(values, std_errors, effect.parameters, strict=False):
-        _, std_error, parameter = estimate
-        prior_std = np.inf if parameter.prior_std is None else parameter.prior_std
-        if 0.0 < std_error**2 < _IDENTIFIED_SHARE * prior_std**2:
-            yield estimate
+    identified = fitted.identified[indices]
+    for number, parameter in enumerate(effect.parameters):
+        if identified[number]:
+            yield float(values[number]), float(std_errors[number]), parameter
 
 
 def _is_oversized(value: float, std_error: float, parameter: Parameter) -> bool:

@@ -53,6 +53,9 @@ _REGISTRATION_TOLERANCE_M = 1e-9
 # Number of earlier rounds from which the next one is extrapolated. A target has three
 # unknowns, so that more rounds than these tell little.
 _REGISTRATION_MEMORY = 6
+# Share of its prior variance above which a parameter counts as not identified: the prior
+# says more of it than the measurements do, and its value is no reason for a warning.
+IDENTIFIED_SHARE = 0.5
 # Upper bound on the Gauss-Newton steps of a fit.
 _MAX_STEPS = 30
 # Upper bound on the halvings of a step. If a 64th of it does not lower the objective,
@@ -151,6 +154,13 @@ class Fit:
                 for _, parameter in self.parameters
             ]
         )
+
+    @property
+    def identified(self) -> np.ndarray:
+        """Parameters of which the measurements say more than their priors, (P,) bool
+        array: at most `IDENTIFIED_SHARE` of the prior variance is left."""
+        variance = np.diag(self.covariance)
+        return (variance > 0.0) & (variance < IDENTIFIED_SHARE * self.prior_std**2)
 
     def parameter_indices(self, owner: str) -> np.ndarray:
         """Indices of the parameters of one owner, such as the key of an effect."""
@@ -747,9 +757,8 @@ def compute_negative_compliances(fitted: Fit) -> np.ndarray:
     if fitted.beyond_bound is None:
         return np.zeros(len(indices))
     std_error = np.sqrt(np.diag(fitted.covariance))[indices]
-    identified = std_error**2 < 0.5 * fitted.prior_std[indices] ** 2
     return np.where(
-        identified,
+        fitted.identified[indices],
         -fitted.beyond_bound[indices] / np.maximum(std_error, np.finfo(float).tiny),
         0.0,
     )
