@@ -484,6 +484,20 @@ def list_campaigns(config: Mapping[str, Any]) -> list[str]:
     return list(dict.fromkeys([*names, *list_league_data(config)]))
 
 
+def refuse_project_name(
+    name: str, config: Mapping[str, Any], source: str | Path
+) -> None:
+    """Refuse a user's campaign, read from `source` or to be written there, that has the
+    name of a campaign of this project: an InputError."""
+    if name in list_campaigns(config):
+        raise InputError(
+            source,
+            "campaign",
+            f"{name!r}, a campaign of elastocal",
+            "a name that no campaign of config.yaml has",
+        )
+
+
 def list_league_data(config: Mapping[str, Any]) -> list[str]:
     """List the data sets of all leagues, each once."""
     data_sets = []
@@ -523,9 +537,7 @@ def find_user_campaign(
     for file in folder.files():
         check_workflow_path(file)
     name = folder.name
-    if name in list_campaigns(config):
-        allowed = "a name that no campaign of config.yaml has"
-        raise InputError(folder.source, "campaign", repr(name), allowed)
+    refuse_project_name(name, config, folder.source)
     earlier_path = _folder_of_results(Path(results, name))
     if earlier_path is not None and not earlier_path.samefile(path):
         finding = f"{name!r}, whose results are of {earlier_path.as_posix()}"

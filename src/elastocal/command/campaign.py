@@ -21,7 +21,7 @@ from elastocal.command.terminal import (
     find_workplace,
     print_answer,
     print_lines,
-    refuse_project_name,
+    refuse_taken_name,
 )
 from elastocal.counting import format_count
 from elastocal.errors import InputError, escape_control_characters
@@ -71,7 +71,7 @@ def init(
 
     check_places(*(folder / name for name in (_ROBOT, DOCUMENT, CSV, PARQUET)))
     _check_new_campaign(folder / DOCUMENT, folder / _ROBOT, robot)
-    refuse_project_name(folder.resolve().name, folder)
+    refuse_taken_name(folder)
     arm = read_robot(robot or folder / _ROBOT)
     targets, measured = read_measured_targets(folder)
     files = {}

@@ -19,7 +19,7 @@ from elastocal.command.terminal import (
     parse_length_m,
     parse_numbers,
     print_answer,
-    refuse_project_name,
+    refuse_taken_name,
 )
 from elastocal.counting import format_count
 from elastocal.errors import InputError, find_text_fault
@@ -225,7 +225,7 @@ def _check_new_folder(folder: Path) -> None:
     from elastocal.io.texts import describe_file_kind
 
     check_campaign_name(folder.resolve())
-    refuse_project_name(folder.resolve().name, folder)
+    refuse_taken_name(folder)
     if os.path.lexists(folder):
         kind = describe_file_kind(os.lstat(folder).st_mode)
         raise InputError(folder, "", f"{kind} that is there", "a new one")

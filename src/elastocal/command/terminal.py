@@ -259,24 +259,15 @@ def _find_checkout() -> Path | None:
     return None
 
 
-def refuse_project_name(name: str, source: Path) -> None:
-    """Refuse the name of a campaign of this project, which `diagnose` would refuse after
-    all has been measured: an InputError."""
-    import yaml
-
-    from elastocal.campaigns.importers import list_campaigns
+def refuse_taken_name(folder: Path) -> None:
+    """Refuse a folder whose name is that of a campaign of this project, which `diagnose`
+    would refuse after all has been measured: an InputError."""
+    from elastocal.campaigns.importers import refuse_project_name
+    from elastocal.io.documents import read_document
 
     path = find_pipeline() / "config.yaml"
-    if not path.is_file():
-        return
-    config = yaml.safe_load(path.read_text(encoding="utf-8"))
-    if name in list_campaigns(config):
-        raise InputError(
-            source,
-            "campaign",
-            f"{name!r}, a campaign of elastocal",
-            "a name that no campaign of config.yaml has",
-        )
+    if path.is_file():
+        refuse_project_name(folder.resolve().name, read_document(path), folder)
 
 
 def load_diagnosed_campaign(folder: Path) -> DiagnosedCampaign:
