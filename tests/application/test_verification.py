@@ -34,17 +34,18 @@ def make_targets(error, *, tracker=None, offset_m=(0.0, 0.0, 0.0), count=COUNT):
         measured = tracker.apply(measured - np.array([3.0, 1.0, 0.5]))
     zeros = np.zeros(count)
     return CommandedTargets(
-        np.arange(1, count + 1),
-        np.zeros((count, 6)),
-        np.zeros((count, 6)),
-        position,
-        rotation,
-        zeros,
-        zeros,
-        zeros,
-        measured,
-        np.ones(count, int),
-        np.arange(count),
+        usable=np.ones(count, bool),
+        joint_angles=np.zeros((count, 6)),
+        wrench=np.zeros((count, 6)),
+        position=position,
+        rotation=rotation,
+        before_m=zeros,
+        after_m=zeros,
+        bound_m=zeros,
+        number=np.arange(1, count + 1),
+        measured=measured,
+        repeats=np.ones(count, int),
+        configuration=np.arange(count),
     )
 
 

@@ -42,6 +42,7 @@ from elastocal.application.frames import (
     fit_placement,
     select_free_parameters,
 )
+from elastocal.exchange.measured_targets import CorrectedTargets
 from elastocal.fitting.least_squares import align_points
 from elastocal.validation.conformity import MIN_CONFIGURATIONS
 
@@ -70,38 +71,21 @@ _SMALLEST_NOISE_M = 1e-9
 
 
 @dataclass(frozen=True)
-class CommandedTargets:
-    """Targets to which a corrected robot was commanded, N of them, all measured.
+class CommandedTargets(CorrectedTargets):
+    """Corrected targets to which a robot was commanded, N of them, all measured.
 
     Attributes
     ----------
     number : (N,) int, row in the table of targets, from 1.
-    joint_angles : (N, n) commands as the controller reports them, rad.
-    wrench : (N, 6) loads, N and N m.
-    position, rotation : (N, 3), m, and (N, 3, 3) wanted poses of the end effector, base
-        axes.
-    before_m, after_m, bound_m : (N,) errors that were predicted for the uncorrected and
-        for the corrected robot, and the upper bound; the bound is NaN where none was
-        stated.
     measured : (N, 3) measured positions of the reflector, m, in the tracker's frame.
     repeats : (N,) int, number of measurements of which each is the mean.
     configuration : (N,) int, configuration of each target, 0 .. C-1.
     """
 
     number: np.ndarray
-    joint_angles: np.ndarray
-    wrench: np.ndarray
-    position: np.ndarray
-    rotation: np.ndarray
-    before_m: np.ndarray
-    after_m: np.ndarray
-    bound_m: np.ndarray
     measured: np.ndarray
     repeats: np.ndarray
     configuration: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.number)
 
 
 @dataclass(frozen=True)

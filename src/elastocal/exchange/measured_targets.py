@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.measurements import ROTATION
@@ -24,14 +25,16 @@ from elastocal.errors import InputError, suggest_names
 from elastocal.exchange.column_names import (
     NO_ROTATION,
     POSITION,
-    convert_to_rotation_vectors,
     find_columns,
     find_rotation,
     find_scales,
     find_units,
-    list_rotation_columns,
-    read_units,
-    recognize_column,
+)
+from elastocal.exchange.pose_table import (
+    PoseTable,
+    TableOptions,
+    read_cells,
+    read_rotation_vectors,
 )
 from elastocal.exchange.target_path import NO_BOUND, OK
 from elastocal.mechanics.components import WRENCH_NAMES
@@ -84,6 +87,12 @@ class CorrectedTargets:
 
     def __len__(self) -> int:
         return len(self.usable)
+
+    def select(self, rows: np.ndarray) -> CorrectedTargets:
+        """Return the targets of some rows (M,), from 0."""
+        return CorrectedTargets(
+            **{name: values[rows] for name, values in vars(self).items()}
+        )
 
 
 @dataclass(frozen=True)
@@ -199,15 +208,15 @@ def read_target_measurements(
         If there are no positions, a cell is not a number, or a measurement belongs to no
         target.
     """
-    text = read_text_table(path, _has_position, units_in=read_units)
+    text = read_cells(path, TableOptions())
     columns, stated_units = find_columns(text, {}, robot)
     notation = find_rotation(text, columns, _state_notation(text))
-    orientation = list_rotation_columns(notation, columns)
+    table = PoseTable(text, columns, stated_units, notation)
     angles = [f"q{joint}" for joint in range(1, robot.joints + 1)]
     if not all(name in columns for name in angles):
         angles = []
     conditions = [name for name in _CONDITIONS if name in columns]
-    wanted = [*POSITION, *orientation, *conditions, *angles]
+    wanted = [*POSITION, *table.orientation, *conditions, *angles]
     usual_units = {"lengths": lengths, "angles": "rad"}
     units = find_units(text, columns, wanted, stated_units, usual_units, robot)
     cells = text.cells(columns, find_scales(units))
@@ -217,14 +226,16 @@ def read_target_measurements(
         _refuse_other_angles(cells, angles, targets.joint_angles[row])
     position = cells.matrix(POSITION)
     _refuse_millimetres(cells, position, targets.position[row])
-    repeat = cells.integers("repeat") if "repeat" in columns else _count(row, names)
+    repeat = _count_repeats(row, names)
+    if "repeat" in columns:
+        repeat = cells.integers("repeat")
     _refuse_repeated(text, row, names, repeat)
     return TargetMeasurements(
         row,
         repeat,
         names,
         position,
-        _read_orientations(cells, notation, orientation),
+        None if notation == NO_ROTATION else read_rotation_vectors(cells, table),
         {name: cells.numbers(name) for name in conditions},
     )
 
@@ -248,22 +259,6 @@ def _refuse_millimetres(cells: Cells, position: np.ndarray, wanted: np.ndarray) 
             "metres; --lengths mm, or a header such as 'x [mm]', states another unit"
         )
         cells.refuse(distance == distance.max(), POSITION, allowed)
-
-
-def _read_orientations(
-    cells: Cells, notation: str, names: Sequence[str]
-) -> np.ndarray | None:
-    """Read orientations as rotation vectors (M, 3), rad; None if there are none."""
-    if notation == NO_ROTATION:
-        return None
-    vectors, wrong = convert_to_rotation_vectors(notation, cells.matrix(names))
-    cells.refuse(wrong, [names[0]], "an orientation")
-    return vectors
-
-
-def _has_position(cells: Sequence[str]) -> bool:
-    """Whether the cells of a line name the columns of a position."""
-    return {recognize_column(cell)[0] for cell in cells} >= set(POSITION)
 
 
 def _state_notation(text: TextTable) -> str | None:
@@ -322,14 +317,10 @@ def _assign_rows(
     return row
 
 
-def _count(row: np.ndarray, names: np.ndarray) -> np.ndarray:
+def _count_repeats(row: np.ndarray, names: np.ndarray) -> np.ndarray:
     """Count the measurements of one target and reflector, from 0."""
-    counted: Counter[tuple[int, str]] = Counter()
-    repeat = np.empty(len(row), int)
-    for index, key in enumerate(zip(row.tolist(), names.tolist(), strict=True)):
-        repeat[index] = counted[key]
-        counted[key] += 1
-    return repeat
+    measurements = pd.DataFrame({"row": row, "name": names})
+    return measurements.groupby(["row", "name"]).cumcount().to_numpy()
 
 
 def _refuse_repeated(

@@ -310,22 +310,14 @@ def _average_measurements(
     """Average the repeated measurements of one reflector at each target."""
     selected = measured.select(measured.target == name)
     row, group = np.unique(selected.row, return_inverse=True)
-    angles = targets.joint_angles[row]
-    configuration = number_configurations(
-        robot.model_angles(angles), np.arange(len(row))
-    )
+    commanded = targets.select(row)
+    model_angles = robot.model_angles(commanded.joint_angles)
     return CommandedTargets(
-        row + 1,
-        angles,
-        targets.wrench[row],
-        targets.position[row],
-        targets.rotation[row],
-        targets.before_m[row],
-        targets.after_m[row],
-        targets.bound_m[row],
-        average_by_group(selected.position, group),
-        np.bincount(group),
-        configuration,
+        **vars(commanded),
+        number=row + 1,
+        measured=average_by_group(selected.position, group),
+        repeats=np.bincount(group),
+        configuration=number_configurations(model_angles, np.arange(len(row))),
     )
 
 

@@ -564,17 +564,18 @@ def _collect_targets(
     count = len(angles)
     not_stated = np.full(count, np.nan)
     return CommandedTargets(
-        np.arange(1, count + 1),
-        angles,
-        wanted.wrench[chosen],
-        wanted.position[chosen],
-        wanted.rotation[chosen],
-        not_stated,
-        not_stated,
-        not_stated,
-        moved.measured[chosen],
-        np.ones(count, int),
-        number_configurations(angles, np.arange(count)),
+        usable=np.ones(count, bool),
+        joint_angles=angles,
+        wrench=wanted.wrench[chosen],
+        position=wanted.position[chosen],
+        rotation=wanted.rotation[chosen],
+        before_m=not_stated,
+        after_m=not_stated,
+        bound_m=not_stated,
+        number=np.arange(1, count + 1),
+        measured=moved.measured[chosen],
+        repeats=np.ones(count, int),
+        configuration=number_configurations(angles, np.arange(count)),
     )
 
 
