@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -455,6 +456,9 @@ def _read_estimates(
     return values.reshape(sets, -1, values.shape[1])
 
 
+# Metrics and replicates of a cell are two files, which are checked one after the other
+# for all cells: a megabyte each is kept.
+@lru_cache(maxsize=100)
 def _average_estimates(
     run: FinishedRun, robot: str, noise_um: str, strategy: str
 ) -> np.ndarray:
@@ -503,11 +507,20 @@ def _compute_deviations(
 ) -> np.ndarray:
     """Position errors (models, tests), m, of models (models, n) at the test
     configurations, linear in the error of the compliances (equation 15)."""
+    regressors, offset = _predict_tests(run, robot)
+    slope = regressors @ (compliance - _get_true_compliance(run, robot)).T
+    return np.linalg.norm(slope.transpose(2, 0, 1) + offset, axis=2)
+
+
+@lru_cache(maxsize=8)
+def _predict_tests(run: FinishedRun, robot: str) -> tuple[np.ndarray, np.ndarray]:
+    """Predict the test configurations of a robot, which all its cells share: matrices A
+    (tests, 3, n), m per rad/(N m), and the error (tests, 3) of the model with the true
+    joint compliances, m."""
     arm = run.arm(robot)
     end = arm.points[-1]
     angles, wrenches = run.experiments(robot, "test")
-    true_compliance = _get_true_compliance(run, robot)
-    springs = arm.build_springs(true_compliance, {})
+    springs = arm.build_springs(_get_true_compliance(run, robot), {})
     regressors = []
     predicted = []
     for q, wrench in zip(angles[0], wrenches[0], strict=True):
@@ -519,9 +532,7 @@ def _compute_deviations(
     true_deflections = run.deflections(
         f"data/simulated/{robot}/test/ideal.parquet", end
     )
-    offset = np.array(predicted) - true_deflections[0, :, :3]
-    slope = np.array(regressors) @ (compliance - true_compliance).T
-    return np.linalg.norm(slope.transpose(2, 0, 1) + offset, axis=2)
+    return np.array(regressors), np.array(predicted) - true_deflections[0, :, :3]
 
 
 CHECKS = {
