@@ -22,7 +22,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import yaml
 from common import ROOT
-from scipy.special import betaincinv
+from rates import format_count_rate
 
 from elastocal.application.accuracy import predict_errors, select_campaign_commands
 from elastocal.application.calibrated import CalibratedRobot, compute_nominal_poses
@@ -306,14 +306,6 @@ def correct_specimen(seed: int, off_m: float, noise_m: float, poses: int) -> Out
     return outcome
 
 
-def describe_rate(count: int, total: int) -> str:
-    """Describe a rate with its Clopper-Pearson interval."""
-    low = betaincinv(count, total - count + 1, 0.025) if count else 0.0
-    high = betaincinv(count + 1, total - count, 0.975) if count < total else 1.0
-    share = 100 * count / max(total, 1)
-    return f"{count} of {total}: {share:.0f} % ({100 * low:.0f}-{100 * high:.0f})"
-
-
 def summarize(outcomes: list[Outcome]) -> None:
     """Print the rates of corrected robots."""
     passes = sum(int(outcome.passes.sum()) for outcome in outcomes)
@@ -324,8 +316,8 @@ def summarize(outcomes: list[Outcome]) -> None:
     held_out = np.mean([outcome.held_out_rms_m for outcome in outcomes])
     bound = np.mean([outcome.bound_m for outcome in outcomes])
     robots_denied = sum(bool(outcome.denied.any()) for outcome in outcomes)
-    print("certificates that the true errors deny,", describe_rate(denied, passes))
-    print("robots with one,", describe_rate(robots_denied, len(outcomes)))
+    print("certificates that the true errors deny,", format_count_rate(denied, passes))
+    print("robots with one,", format_count_rate(robots_denied, len(outcomes)))
     print(f"within the bound: {100 * within.mean():.1f} ± {196 * std_error:.1f} %")
     print(f"mean true error {1e3 * error:.3f} mm, bound {1e3 * bound:.3f} mm,")
     print(f"held-out RMS {1e3 * held_out:.4f} mm")
@@ -344,7 +336,7 @@ def main() -> None:
     seeds = range(arguments.seed, arguments.seed + arguments.count)
     if arguments.what == "poses":
         false = sum(measure_false_effects(seed, noise_m) for seed in seeds)
-        print("robots with a false effect,", describe_rate(false, len(seeds)))
+        print("robots with a false effect,", format_count_rate(false, len(seeds)))
         return
     off_m = 1e-3 * arguments.off_mm
     summarize(

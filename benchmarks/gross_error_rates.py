@@ -18,7 +18,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from common import ROOT
-from scipy.stats import beta
+from rates import format_count_rate
 
 from elastocal.campaigns.writing import write_campaign
 from elastocal.loop.whole import diagnose_folder
@@ -232,13 +232,6 @@ def summarize(verdict):
     return verdict["verdict"], sorted(effects)
 
 
-def format_rate(hits, count):
-    """Format a rate with its interval of 95 % by Clopper and Pearson."""
-    low = beta.ppf(0.025, hits, count - hits + 1) if hits else 0.0
-    high = beta.ppf(0.975, hits + 1, count - hits) if hits < count else 1.0
-    return f"{hits} of {count}, {100 * hits / count:.2f} % [{100 * low:.2f}, {100 * high:.2f}]"
-
-
 def study_effects(cases, seed):
     """Left-out rows of campaigns in which no row is wrong."""
     left_out = []
@@ -258,8 +251,11 @@ def study_effects(cases, seed):
             f" {time.process_time() - start:.1f} s",
             flush=True,
         )
-    print("good rows left out:", format_rate(sum(left_out), sum(rows)))
-    print("campaigns that lose a row:", format_rate(np.count_nonzero(left_out), cases))
+    print("good rows left out:", format_count_rate(sum(left_out), sum(rows)))
+    print(
+        "campaigns that lose a row:",
+        format_count_rate(np.count_nonzero(left_out), cases),
+    )
 
 
 def study_slips(cases, seed):
@@ -286,9 +282,9 @@ def study_slips(cases, seed):
             f" {seconds:.1f} s",
             flush=True,
         )
-    print("wrong rows left out:", format_rate(counts[0], counts[1]))
-    print("good rows left out:", format_rate(counts[2], counts[3]))
-    print("same verdict as without them:", format_rate(counts[4], cases))
+    print("wrong rows left out:", format_count_rate(counts[0], counts[1]))
+    print("good rows left out:", format_count_rate(counts[2], counts[3]))
+    print("same verdict as without them:", format_count_rate(counts[4], cases))
 
 
 if __name__ == "__main__":

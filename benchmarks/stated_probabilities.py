@@ -11,6 +11,7 @@ import tempfile
 from pathlib import Path
 
 import pandas as pd
+from rates import format_rate
 
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.settings import Settings
@@ -19,7 +20,7 @@ from elastocal.io.json_files import read_json
 from elastocal.loop.whole import read_cases
 from elastocal_proof.blind.cases import list_cases, write_sealed_case
 from elastocal_proof.blind.locations import list_locations
-from elastocal_proof.blind.scores import build_case_row, compute_rate
+from elastocal_proof.blind.scores import build_case_row
 from elastocal_proof.blind.summary import tabulate_reliability
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
@@ -41,15 +42,6 @@ def diagnose_cases(count, seed, folder):
     return pd.DataFrame(rows), pd.DataFrame(locations)
 
 
-def print_rate(words, hits):
-    """Print a share with its interval."""
-    rate = compute_rate(hits)
-    print(
-        f"{words}: {rate['hits']} of {rate['cases']},"
-        f" {rate['rate']:.3f} ({rate['low']:.3f}-{rate['high']:.3f})"
-    )
-
-
 def main():
     """Print the figures of a number of cases."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -62,14 +54,19 @@ def main():
     print(reliability[reliability.group == "all"].round(3).to_string(index=False))
     outside = cases[cases.group == "outside"]
     named = cases[cases.verdict == "named"]
-    print_rate("wrong single name, cause outside the catalogue", outside.wrong_name)
-    print_rate("wrong single name, all cases", cases.wrong_name)
-    print_rate("right name, of those stated alone", named.named_right)
-    print_rate("alarms without an effect", cases[cases.truth == "none"].detected)
+    print(
+        "wrong single name, cause outside the catalogue:",
+        format_rate(outside.wrong_name),
+    )
+    print("wrong single name, all cases:", format_rate(cases.wrong_name))
+    print("right name, of those stated alone:", format_rate(named.named_right))
+    print(
+        "alarms without an effect:", format_rate(cases[cases.truth == "none"].detected)
+    )
     if len(locations):
         stated = locations[locations.stated]
-        print_rate("joints of named effects, all right", stated.right)
-        print_rate("joints of named effects, all wrong", stated.wrong)
+        print("joints of named effects, all right:", format_rate(stated.right))
+        print("joints of named effects, all wrong:", format_rate(stated.wrong))
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ FIRST_SEED [ROBOT...]` prints for each law how often its name leads, how often a
 one is stated at 65 % or more, and how often nothing is.
 """
 
-import argparse
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import yaml
+from rates import make_parser
 from weak_springs import FALSE_NAME, ROBOTS, declare_masses, write_simulated_campaign
 
 from elastocal.diagnosis.diagnose import diagnose
@@ -73,15 +73,11 @@ def diagnose_one(name: str, law: str, seed: int, force: float) -> dict[str, Any]
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("cases", type=int)
-    parser.add_argument("first_seed", type=int)
-    parser.add_argument("robots", nargs="*", default=ARMS)
+    parser = make_parser(__doc__, ARMS)
     parser.add_argument(
         "--force", type=float, default=0.3, help="largest force over the typical one"
     )
     parser.add_argument("--laws", nargs="*", default=LAWS)
-    parser.add_argument("--each", action="store_true", help="print each campaign too")
     options = parser.parse_args()
     print("law cases right wrong nothing")
     for law in options.laws:

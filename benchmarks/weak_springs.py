@@ -10,7 +10,6 @@ spring or mass, with a false name of 65 % or more, with effects adopted, and the
 error of the corrected robot over that before.
 """
 
-import argparse
 import json
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,6 +18,7 @@ from typing import Any
 import numpy as np
 import yaml
 from common import ROOT
+from rates import make_parser
 
 from elastocal.campaigns.writing import write_campaign
 from elastocal.diagnosis.diagnose import diagnose
@@ -146,12 +146,7 @@ def diagnose_one(name: str, seed: int) -> dict[str, Any]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("cases", type=int)
-    parser.add_argument("first_seed", type=int)
-    parser.add_argument("robots", nargs="*", default=ARMS)
-    parser.add_argument("--each", action="store_true", help="print each campaign too")
-    options = parser.parse_args()
+    options = make_parser(__doc__, ARMS).parse_args()
     print("robot cases impossible false_names adopted after_over_floor")
     for name in options.robots:
         rows = []

@@ -9,7 +9,6 @@ for each robot the geometric mean of the ratio of the held-out errors, and the m
 pose error that either takes for noise.
 """
 
-import argparse
 import json
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import yaml
+from rates import make_parser
 from weak_springs import ROBOTS, declare_masses, write_simulated_campaign
 
 from elastocal.diagnosis.diagnose import diagnose
@@ -63,12 +63,7 @@ def diagnose_one(name: str, seed: int, *, declared: bool) -> dict[str, Any]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("cases", type=int)
-    parser.add_argument("first_seed", type=int)
-    parser.add_argument("robots", nargs="*", default=ARMS)
-    parser.add_argument("--each", action="store_true", help="print each campaign too")
-    options = parser.parse_args()
+    options = make_parser(__doc__, ARMS).parse_args()
     print("robot cases ratio_to_best largest_ratio pose_urad pose_urad_of_best")
     for name in options.robots:
         without = []
