@@ -50,12 +50,12 @@ def format_accuracy(accuracy: Accuracy) -> str:
 def format_frame(frame: str, *, offset_removed: bool) -> str:
     """Say in which frame, a key of `FRAMES`, errors are stated, and which offset is
     subtracted."""
-    words = FRAMES[frame]
+    description = FRAMES[frame]
     if not offset_removed:
-        return words
+        return description
     if frame == ROBOT:
-        return f"{words.removesuffix(')')} and {_OFFSET})"
-    return f"{words} (after the best choice {_OFFSET})"
+        return f"{description.removesuffix(')')} and {_OFFSET})"
+    return f"{description} (after the best choice {_OFFSET})"
 
 
 def _format_bounded(accuracy: Accuracy, error_m: float, bound_m: float | None) -> str:

@@ -110,9 +110,9 @@ def _read_workbook(content: bytes, path: str | Path, sheet: str | None) -> list[
         raise
     except Exception as error:
         # The library raises whatever its parts raise at a damaged file.
-        found = f"a damaged workbook ({error})"
+        finding = f"a damaged workbook ({error})"
         raise InputError(
-            path, "", found, "a workbook that a spreadsheet opens"
+            path, "", finding, "a workbook that a spreadsheet opens"
         ) from None
     return [_CELLS_SEPARATED_BY.join(map(_format_cell, row)) for row in rows]
 
@@ -132,18 +132,18 @@ def _check_archive(content: bytes, path: str | Path) -> None:
                 raise InputError(path, "", kind, "a workbook (.xlsx), or CSV")
             size = sum(member.file_size for member in archive.infolist())
             if size > _LARGEST_BYTES:
-                found = f"a workbook of {size} bytes"
-                raise InputError(path, "", found, f"at most {_LARGEST_BYTES}")
+                finding = f"a workbook of {size} bytes"
+                raise InputError(path, "", finding, f"at most {_LARGEST_BYTES}")
             for member in archive.infolist():
                 with archive.open(member) as file:
                     beginning = file.read(4096)
                 if b"<!DOCTYPE" in beginning or b"<!ENTITY" in beginning:
-                    found = f"{member.filename} with a document type"
-                    raise InputError(path, "", found, "a workbook, which has none")
+                    finding = f"{member.filename} with a document type"
+                    raise InputError(path, "", finding, "a workbook, which has none")
     except (zipfile.BadZipFile, OSError, NotImplementedError, RuntimeError) as error:
-        found = f"a damaged archive ({error})"
+        finding = f"a damaged archive ({error})"
         raise InputError(
-            path, "", found, "a workbook that a spreadsheet opens"
+            path, "", finding, "a workbook that a spreadsheet opens"
         ) from None
 
 
@@ -160,8 +160,8 @@ def _choose_sheet(
         if rows:
             chosen[name] = rows
     if len(chosen) != 1:
-        found = f"sheets {', '.join(map(repr, chosen))}" if chosen else "no cell"
-        raise InputError(path, "", found, "--sheet NAME, one of them with cells")
+        finding = f"sheets {', '.join(map(repr, chosen))}" if chosen else "no cell"
+        raise InputError(path, "", finding, "--sheet NAME, one of them with cells")
     return next(iter(chosen.values()))
 
 
@@ -216,8 +216,8 @@ def _read_matlab(
     except InputError:
         raise
     except Exception as error:
-        found = f"a damaged MATLAB file ({error})"
-        raise InputError(path, "", found, "one that MATLAB opens") from None
+        finding = f"a damaged MATLAB file ({error})"
+        raise InputError(path, "", finding, "one that MATLAB opens") from None
     headers = []
     for name, array in columns.items():
         width = array.shape[1]

@@ -1,9 +1,11 @@
 """`elastocal demo`: the whole way, from a plan to a verification, on a simulated
 robot."""
 
+from __future__ import annotations
+
 import shlex
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from typer import Argument, Option
@@ -16,6 +18,11 @@ from elastocal.command.terminal import (
     print_lines,
 )
 from elastocal.counting import format_count
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from rich.console import Console
 
 # Fewer candidates than a real plan takes, for a demonstration of a minute.
 _PLAN = (
@@ -109,16 +116,23 @@ def demo(
     defects_in_words = describe_hidden_effects(defects, effect or ())
     report = find_workplace() / "reports" / "loop" / folder.resolve().name
     print_lines([""], console)
+    _print_result(errors_mm, defects_in_words, report / "report.html", console)
+
+
+def _print_result(
+    errors_mm: Mapping[str, float], defects: str, report: Path, console: Console
+) -> None:
+    """Print the errors of the simulated robot, and what was hidden in it."""
     print_answer(
         "The simulated robot follows a milling path under load:"
         f" position error {errors_mm['uncorrected']:.2f} mm RMS before,"
         f" {errors_mm['corrected']:.3f} mm after"
         f" (noise and repeatability alone: {errors_mm['noise alone']:.3f} mm)",
         [
-            f"hidden in it: {defects_in_words},"
+            f"hidden in it: {defects},"
             " beside errors of every link, joint zero, gear and weight",
             _WEIGHTS,
-            f"report: {report / 'report.html'}",
+            f"report: {report}",
         ],
         "the same with your robot: elastocal --help",
         console,

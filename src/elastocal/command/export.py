@@ -53,9 +53,7 @@ def export(
     from rich.console import Console
 
     from elastocal.application.accuracy import predict_campaign_accuracy
-    from elastocal.application.calibrated import compute_nominal_poses
     from elastocal.application.exported import (
-        compute_file_error_m,
         compute_urdf_deviation_m,
         compute_urdf_poses,
         fold_effects,
@@ -93,12 +91,13 @@ def export(
             deviation_m = compute_urdf_deviation_m(
                 urdf_poses[0], folded.robot, commands
             )
-            details += [str(output / URDF), *_describe_urdf(corrected, deviation_m)]
-            urdf_m, original_m = (
-                compute_file_error_m(calibrated, *poses, commands, states.wrench)
-                for poses in (urdf_poses, compute_nominal_poses(nominal, commands))
-            )
-            details.append(_describe_urdf_error(urdf_m, original_m, accuracy.rms_m))
+            details += [
+                str(output / URDF),
+                *_describe_urdf(corrected, deviation_m),
+                _describe_urdf_error(
+                    calibrated, urdf_poses, commands, states.wrench, accuracy.rms_m
+                ),
+            ]
     note_written_files(files, find_workplace())
     print_answer(
         f"{campaign.name}: calibrated robot in {output}",
@@ -192,15 +191,30 @@ def _describe_urdf(corrected: CorrectedUrdf, deviation_m: float) -> list[str]:
     return sentences
 
 
-def _describe_urdf_error(urdf_m: float, original_m: float, corrected_m: float) -> str:
+def _describe_urdf_error(
+    calibrated: CalibratedRobot,
+    urdf_poses: tuple[np.ndarray, np.ndarray],
+    reported_angles: np.ndarray,
+    wrench: np.ndarray,
+    corrected_m: float,
+) -> str:
     """Say by how much a robot errs that is commanded by the URDF.
 
     Parameters
     ----------
-    urdf_m, original_m : RMS distances of the poses of the URDF, and of the URDF before the
-        calibration, from those of the calibrated robot.
+    calibrated : the robot.
+    urdf_poses : positions (N, 3), m, and rotations (N, 3, 3) of the URDF.
+    reported_angles, wrench : (N, n) commands, rad, and (N, 6) loads, N and N m.
     corrected_m : RMS error of the calibrated robot itself.
     """
+    from elastocal.application.calibrated import compute_nominal_poses
+    from elastocal.application.exported import compute_file_error_m
+
+    original_poses = compute_nominal_poses(calibrated.robot, reported_angles)
+    urdf_m, original_m = (
+        compute_file_error_m(calibrated, *poses, reported_angles, wrench)
+        for poses in (urdf_poses, original_poses)
+    )
     error_mm = 1e3 * math.hypot(urdf_m, corrected_m)
     original_mm = 1e3 * math.hypot(original_m, corrected_m)
     return (

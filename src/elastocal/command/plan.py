@@ -335,17 +335,17 @@ def _describe_improvement(accuracy_m: dict[str, float]) -> list[str]:
     """Say what would help most, if it would help noticeably."""
     from elastocal.application.statements import format_millimetres
 
-    best = min(accuracy_m, key=lambda words: accuracy_m[words])
+    best = min(accuracy_m, key=lambda change: accuracy_m[change])
     if accuracy_m[best] > _NOTICEABLE_SHARE * accuracy_m[""]:
         return []
-    others = [
-        f"{words} {format_millimetres(error_m)}"
-        for words, error_m in accuracy_m.items()
-        if words not in ("", best)
+    further = [
+        f"{change} {format_millimetres(error_m)}"
+        for change, error_m in accuracy_m.items()
+        if change not in ("", best)
     ]
     return [
         f"What would help most: {best}, {format_millimetres(accuracy_m[best])}"
-        f" in place of {format_millimetres(accuracy_m[''])} ({'; '.join(others)})."
+        f" in place of {format_millimetres(accuracy_m[''])} ({'; '.join(further)})."
     ]
 
 

@@ -404,10 +404,10 @@ def _list_accidents(
     poses = []
     for number, term in enumerate(problem.terms):
         if term.mechanism == GROSS_ERROR:
-            kind, place = term.location
+            kind, index = term.location
             if kind == ROW:
                 rows.append(number)
-            if kind == POSE or not in_wrong_pose[int(place)]:
+            if kind == POSE or not in_wrong_pose[int(index)]:
                 poses.append(number)
     return [tuple(rows), tuple(poses)]
 

@@ -369,8 +369,9 @@ def _search_and_judge_rows(
             search = _restart_search(subset, evidence, fitted)
             return _RowRound(number + 1, subset, readmitted, search)
         fitted = refitted
-    standing_out = outliers.distant & subset.kept
-    return _SettledRows(subset, outliers, standing_out, evidence, fitted)
+    return _SettledRows(
+        subset, outliers, outliers.distant & subset.kept, evidence, fitted
+    )
 
 
 def _find_readmitted(outliers: OutlierTest, kept: np.ndarray) -> np.ndarray:

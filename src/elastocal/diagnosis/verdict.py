@@ -303,8 +303,10 @@ def _add_confounded_mechanisms(
     for name, listed in conclusion.alternatives.items():
         confounded = find_confounded_mechanisms(problem, model, name)
         alternatives[name] = tuple(dict.fromkeys((*listed, *confounded)))
-        others = [mechanism for mechanism in best.mechanisms if mechanism != name]
-        replaced |= {tuple(sorted([*others, other])) for other in confounded}
+        companions = [mechanism for mechanism in best.mechanisms if mechanism != name]
+        replaced |= {
+            tuple(sorted([*companions, mechanism])) for mechanism in confounded
+        }
     if not replaced:
         return conclusion
     listed_hypotheses = [

@@ -171,7 +171,6 @@ def robot_from_dh(
         Something cannot be read: the error has its file, line and column. Or nothing
         states the unit of a column.
     """
-    source = Path(path).as_posix()
     name = name or Path(path).stem
     if Path(path).suffix.lower() in (".yaml", ".yml"):
         for option, is_given in (
@@ -188,18 +187,8 @@ def robot_from_dh(
         return _robot_from_kinematics(path, name)
     table = _read_table(path, options)
     document: dict[str, Any] = {"name": name}
-    names = table.joint_names
-    # Numbers only count the joints; they do not name them.
-    if not all(joint_name.isdecimal() for joint_name in names) and any(names):
-        for joint_name in names:
-            if not joint_name or names.count(joint_name) > 1:
-                raise InputError(
-                    source,
-                    "column joint",
-                    repr(joint_name),
-                    "a name for every joint, each once",
-                )
-        document["joint_names"] = names
+    if _names_joints(table, Path(path).as_posix()):
+        document["joint_names"] = table.joint_names
     if table.limits:
         document["joint_limits_deg"] = table.limits
     rows = [*_split_rows(table, modified=modified)]
@@ -221,6 +210,19 @@ def robot_from_dh(
     notation = "modified" if modified else "standard"
     description = f"{notation} Denavit-Hartenberg parameters"
     return check_imported(document, path, description, notes)
+
+
+def _names_joints(table: _DhTable, source: str) -> bool:
+    """Whether a table has names of its joints; names that are missing or there twice are
+    refused. Numbers only count the joints; they do not name them."""
+    names = table.joint_names
+    if all(name.isdecimal() for name in names) or not any(names):
+        return False
+    for name in names:
+        if not name or names.count(name) > 1:
+            allowed = "a name for every joint, each once"
+            raise InputError(source, "column joint", repr(name), allowed)
+    return True
 
 
 def _sum_lengths(tokens: list[str]) -> float:
@@ -360,8 +362,8 @@ def _find_columns(
             unit = choose_unit(text, header, stated)
             units[name] = _check_unit(text, header, ANGLE, unit, options)
     if len({units.get(name) for name in _LIMITS}) > 1:
-        found = f"lower in {units.get('lower')} and upper in {units.get('upper')}"
-        raise InputError(text.path, "header", found, "both limits, in one unit")
+        finding = f"lower in {units.get('lower')} and upper in {units.get('upper')}"
+        raise InputError(text.path, "header", finding, "both limits, in one unit")
     for name in _NEEDED:
         if name not in headers:
             raise InputError(

@@ -227,13 +227,13 @@ def _choose_column(
     both = f"{len(points.lines)} rows here, {len(joints.lines)} in {joints.path}"
     order = f"--join {BY_ORDER} (line {points.lines[0]} to line {joints.lines[0]}, …,"
     order += f" line {points.lines[-1]} to line {joints.lines[-1]})"
-    found = "no column that both files have"
+    finding = "no column that both files have"
     if common:
-        found = f"several columns that both files have: {', '.join(common)}"
+        finding = f"several columns that both files have: {', '.join(common)}"
     raise InputError(
         points.path,
         "header",
-        f"{found}; {both}",
+        f"{finding}; {both}",
         f"--join COLUMN, --join {BY_TIME}, or if their rows are in one order {order}",
     )
 
@@ -291,13 +291,13 @@ def _pair_rows(
     pairs = [-1] * len(measured.lines)
     for key, rows in measured.group().items():
         partners = groups.get(key, [])
-        what = measured.describe(rows[0])
+        description = measured.describe(rows[0])
         line = f"line {measured.lines[rows[0]]}"
         if not partners:
             raise InputError(
                 measured.path,
                 line,
-                f"{what}, which {source} does not have",
+                f"{description}, which {source} does not have",
                 "rows that it has; --column and --target state what they are called",
             )
         if len(partners) == 1:
@@ -305,8 +305,8 @@ def _pair_rows(
         if len(partners) != len(rows):
             raise InputError(
                 measured.path,
-                line if what else "",
-                f"{format_count(len(rows), 'row')} of {what or 'measurements'}",
+                line if description else "",
+                f"{format_count(len(rows), 'row')} of {description or 'measurements'}",
                 f"{len(partners)}, as {source} has",
             )
         for row, partner in zip(rows, partners, strict=True):

@@ -244,8 +244,8 @@ def _read_source(
         return source
     if joint_file.is_sheet:
         return _join_sheet(source, options, robot, joint_file.path)
-    other = _read_joint_file(joint_file.path, options)
-    joined = join_files(text, other, options.join, skip_empty=options.skip_empty)
+    joints = _read_joint_file(joint_file.path, options)
+    joined = join_files(text, joints, options.join, skip_empty=options.skip_empty)
     text = _leave_out(joined.text, options.ignore)
     return _Source(text, headers, {}, notes + joined.notes)
 

@@ -61,8 +61,9 @@ def unwrap_into_limits(
 def _counts_alone(robot: Robot, joint: int) -> bool:
     """Whether a reported angle turns one joint of the chain, and turns it as far."""
     matrix = np.abs(robot.reported_matrix)
-    others = np.delete(matrix[joint], joint), np.delete(matrix[:, joint], joint)
-    return bool(matrix[joint, joint] == 1.0 and not any(map(np.any, others)))
+    is_coupled = np.delete(matrix[joint], joint).any()
+    is_coupled |= np.delete(matrix[:, joint], joint).any()
+    return bool(matrix[joint, joint] == 1.0 and not is_coupled)
 
 
 def _find_turns(reported: np.ndarray, robot: Robot, joint: int) -> np.ndarray:

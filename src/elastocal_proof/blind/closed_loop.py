@@ -468,9 +468,7 @@ def compare_stated_accuracy(
     if frame != "base":
         random_poses = corrected & (wanted.part != MILLING)
         errors = _subtract_placement(wanted, errors, random_poses)
-    tolerance_m = np.exp(
-        open_simulation_stream(seed, "tolerance").uniform(*np.log(_TOLERANCES_M))
-    )
+    tolerance_m = _draw_tolerance_m(seed)
     rows = []
     for part in STATED_PARTS:
         chosen = corrected & np.isin(wanted.part, STATED_PARTS[part])
@@ -489,14 +487,20 @@ def compare_stated_accuracy(
                 **{name: getattr(accuracy, name) for name in _STATED},
                 "true_rms_m": float(np.sqrt((distance**2).mean())),
                 "true_worst_m": float(distance.max()),
-                "tolerance_m": float(tolerance_m),
+                "tolerance_m": tolerance_m,
                 "decision": decide_conformity(
-                    prediction.rms_m, float(tolerance_m), _RISK
+                    prediction.rms_m, tolerance_m, _RISK
                 ).decision,
             }
-            | _verify(calibrated, wanted, moved, chosen, float(tolerance_m))
+            | _verify(calibrated, wanted, moved, chosen, tolerance_m)
         )
     return rows
+
+
+def _draw_tolerance_m(seed: int) -> float:
+    """Draw the tolerance that a case must keep, m."""
+    stream = open_simulation_stream(seed, "tolerance")
+    return float(np.exp(stream.uniform(*np.log(_TOLERANCES_M))))
 
 
 @dataclass(frozen=True)

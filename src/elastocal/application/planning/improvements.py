@@ -47,8 +47,8 @@ def compare_improvements(
     on_end = [target for target in survey.targets if target.point == end_effector]
     if len(on_end) == 1:
         targets = (*survey.targets, *_add_reflectors(on_end[0], names))
-        words = f"three reflectors on {end_effector}, {_APART_M:g} m apart"
-        changes[words] = (replace(survey, targets=targets), 1)
+        bracket = f"three reflectors on {end_effector}, {_APART_M:g} m apart"
+        changes[bracket] = (replace(survey, targets=targets), 1)
     if survey.measured == "position":
         sensor = SENSORS["pose"]
         measured = replace(
@@ -57,8 +57,8 @@ def compare_improvements(
         changes["orientations beside positions"] = (measured, 1)
     changes["twice as many poses"] = (survey, 2)
     return {
-        words: _compute_accuracy(changed, survey, fitted, workspace, copies)
-        for words, (changed, copies) in changes.items()
+        change: _compute_accuracy(changed, survey, fitted, workspace, copies)
+        for change, (changed, copies) in changes.items()
     }
 
 
