@@ -42,6 +42,33 @@ def test_an_interrupt_ends_without_a_traceback(tmp_path, delay_s):
     assert b"Traceback" not in output + errors
 
 
+_MISLED_LIBRARY = """
+import os, signal, sys, types
+import elastocal.__main__ as entry
+
+def fail():
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+        signal.pause()
+    except KeyboardInterrupt:
+        sys.exit("Python: found initialization failed")
+
+module = types.ModuleType("elastocal.command.main")
+module.main = fail
+sys.modules["elastocal.command.main"] = module
+entry.main()
+"""
+
+
+def test_an_interrupt_that_a_library_takes_for_a_fault_is_an_interrupt():
+    """Modules in C turn one during their import into an ImportError."""
+    finished = subprocess.run(
+        [sys.executable, "-c", _MISLED_LIBRARY], capture_output=True, check=False
+    )
+    assert finished.returncode == 130
+    assert finished.stderr == b""
+
+
 @pytest.mark.parametrize(("stated", "expected"), [(None, "1"), ("2", "2")])
 def test_numerical_libraries_have_one_thread_unless_the_user_says_otherwise(
     stated, expected

@@ -7,8 +7,10 @@ limited before they start, and an interrupt during the imports ends without a tr
 
 import ctypes
 import os
+import signal
 import sys
 from contextlib import suppress
+from types import FrameType
 
 # A subcommand works on small matrices, which more threads do not make faster: they only
 # wait for each other. Who wants more sets these variables.
@@ -30,14 +32,26 @@ _INTERRUPTED = 130
 
 
 def main() -> None:
-    """Run the application. An interrupt ends it with the exit code 130."""
+    """Run the application. An interrupt ends it with the exit code 130, also where a
+    library that is being imported has turned it into an error of its own."""
+    interrupts = []
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        interrupts.append(number)
+        raise KeyboardInterrupt
+
+    # Who starts a process in the background may have it ignore interrupts.
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, interrupt)
     try:
         prepare_process()
         from elastocal.command.main import main as run_application
 
         run_application()
-    except KeyboardInterrupt:
-        sys.exit(_INTERRUPTED)
+    except (KeyboardInterrupt, SystemExit):
+        if interrupts:
+            sys.exit(_INTERRUPTED)
+        raise
 
 
 def prepare_process() -> None:
