@@ -107,19 +107,28 @@ def average_models(
     shift = {}
     std_error = {}
     for key, (estimate, _) in best_moments.items():
-        weight, mean, variance = np.array(
-            [
-                (probability, *moments[key])
-                for probability, moments in weighted_moments
-                if key in moments
-            ]
-        ).T
-        weight = weight / weight.sum()
-        average = weight @ mean
-        shift[key] = float(average - estimate)
-        std_error[key] = float(np.sqrt(weight @ (variance + (mean - average) ** 2)))
+        mean, variance = _mix_moments(weighted_moments, key)
+        shift[key] = float(mean - estimate)
+        std_error[key] = float(np.sqrt(variance))
     prior_dominated = _find_prior_dominated(problem, best, std_error)
     return ModelAverage(shift, std_error, prior_dominated)
+
+
+def _mix_moments(
+    weighted_moments: Sequence[tuple[float, Moments]], key: ParameterKey
+) -> tuple[float, float]:
+    """Mean and variance of a parameter over the models that contain it, each with the
+    probability of the model."""
+    probability, mean, variance = np.array(
+        [
+            (probability, *moments[key])
+            for probability, moments in weighted_moments
+            if key in moments
+        ]
+    ).T
+    weight = probability / probability.sum()
+    average = weight @ mean
+    return average, weight @ (variance + (mean - average) ** 2)
 
 
 def allow_for_laws(

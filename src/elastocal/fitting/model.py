@@ -36,7 +36,7 @@ from elastocal.mechanics.robot_file import parse_robot
 from elastocal.mechanics.sites import Sites, build_sites
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
     from typing import Any
 
     from elastocal.campaigns.campaign import Target
@@ -317,6 +317,23 @@ def get_parameter_values(model: Model, estimate: Estimate) -> np.ndarray:
 def apply_step(model: Model, estimate: Estimate, step: np.ndarray) -> Estimate:
     """Apply a step (P,) of all parameters; shapes stay in their ranges."""
     components = iter(np.split(step, np.cumsum(_group_sizes(model, estimate))))
+    placement = _move_placement(model, estimate, components)
+    coefficients = []
+    shapes = []
+    for effect, values, shape_values in zip(
+        model.effects, estimate.coefficients, estimate.shapes, strict=True
+    ):
+        coefficients.append(values + next(components))
+        lowest = [shape.lowest for shape in effect.shapes]
+        highest = [shape.highest for shape in effect.shapes]
+        shapes.append(np.clip(shape_values + next(components), lowest, highest))
+    return replace(placement, coefficients=tuple(coefficients), shapes=tuple(shapes))
+
+
+def _move_placement(
+    model: Model, estimate: Estimate, components: Iterator[np.ndarray]
+) -> Estimate:
+    """Move the frames and targets of an estimate by the next components of a step."""
     frame_rotation = estimate.frame_rotation.copy()
     frame_position = estimate.frame_position.copy()
     if model.fitted_frames:
@@ -334,23 +351,12 @@ def apply_step(model: Model, estimate: Estimate, step: np.ndarray) -> Estimate:
         target_offset[index] += motion_of_target[:3]
         rotation = Rotation.from_rotvec(motion_of_target[3:]).as_matrix()
         target_rotation[index] = rotation @ target_rotation[index]
-    coefficients = []
-    shapes = []
-    for effect, values, shape_values in zip(
-        model.effects, estimate.coefficients, estimate.shapes, strict=True
-    ):
-        coefficients.append(values + next(components))
-        lowest = [shape.lowest for shape in effect.shapes]
-        highest = [shape.highest for shape in effect.shapes]
-        shapes.append(np.clip(shape_values + next(components), lowest, highest))
-    return Estimate(
-        estimate.sessions,
-        frame_rotation,
-        frame_position,
-        target_offset,
-        target_rotation,
-        tuple(coefficients),
-        tuple(shapes),
+    return replace(
+        estimate,
+        frame_rotation=frame_rotation,
+        frame_position=frame_position,
+        target_offset=target_offset,
+        target_rotation=target_rotation,
     )
 
 

@@ -57,8 +57,7 @@ def parse_chain_elements(
     """
     text = document["chain"]
     lengths = document.get("lengths_m", {})
-    springs_per_link = 6 if "links" in document else 0
-    coordinates = len({*_JOINT.findall(text)})
+    joints = len({*_JOINT.findall(text)})
     vector = np.zeros(3)
     elements: list[ChainElement] = []
     points: list[ChainElement] = []
@@ -70,10 +69,8 @@ def parse_chain_elements(
             continue
         is_joint = _JOINT.fullmatch(argument)
         if vector.any() and (kind == "R" or is_joint):
-            for k in range(springs_per_link):
-                spring = ChainElement("TR"[k // 3], k % 3, coordinate=coordinates + k)
-                elements.append(spring)
-            coordinates += springs_per_link
+            if "links" in document:
+                elements += _list_springs(joints + 6 * len(links))
             links.append(vector)
             vector = np.zeros(3)
         elements += points
@@ -81,16 +78,25 @@ def parse_chain_elements(
         axis = "xyz".index(letter)
         sign = -1.0 if minus else 1.0
         if is_joint:
-            joint = int(argument[1:]) - 1
-            elements.append(ChainElement(kind, axis, coordinate=joint, sign=sign))
-        elif kind == "R":
-            angle = np.deg2rad(float(argument.removesuffix("deg")))
-            elements.append(ChainElement(kind, axis, sign * angle))
+            coordinate = int(argument[1:]) - 1
+            elements.append(ChainElement(kind, axis, 0.0, coordinate, sign))
+            continue
+        if kind == "R":
+            amount = sign * np.deg2rad(float(argument.removesuffix("deg")))
         else:
-            length = sign * float(lengths.get(argument, argument))
-            elements.append(ChainElement(kind, axis, length))
-            vector[axis] += length
+            amount = sign * float(lengths.get(argument, argument))
+            vector[axis] += amount
+        elements.append(ChainElement(kind, axis, amount))
     return elements, links
+
+
+def _list_springs(first_coordinate: int) -> list[ChainElement]:
+    """Three springs along the axes and three about them, at the end of a link."""
+    return [
+        ChainElement(kind, axis, coordinate=first_coordinate + 3 * block + axis)
+        for block, kind in enumerate("TR")
+        for axis in range(3)
+    ]
 
 
 class Arm:

@@ -35,13 +35,10 @@ def check_simulated_campaign(
 ) -> Iterator[Finding]:
     """Every angle, load and noise of a simulated campaign from its stream, every pose
     of the elastic arm by pinocchio."""
-    config = run.folder / "config"
-    path = config / f"campaigns/{campaign}.yaml"
-    plan = yaml.safe_load(path.read_text("utf-8")) if path.is_file() else {}
+    plan = _read_configuration(run, f"campaigns/{campaign}.yaml")
     if plan.get("source") != "simulated":
         return
-    path = config / f"robots/{plan['robot']}.yaml"
-    arm = Arm(yaml.safe_load(path.read_text("utf-8")))
+    arm = Arm(_read_configuration(run, f"robots/{plan['robot']}.yaml"))
     stream = open_philox_stream(run.seed, campaign, "campaign")
     visits, angles, wrenches = _draw_visits(arm, plan, stream)
     deflected = [
@@ -49,13 +46,12 @@ def check_simulated_campaign(
         for q, wrench in zip(angles, wrenches, strict=True)
     ]
     for point in plan["points"]:
-        noise = plan["noise_m"] * stream.standard_normal((len(visits), 3))
+        shifts = plan["noise_m"] * stream.standard_normal((len(visits), 3))
         turns = plan["noise_rad"] * stream.standard_normal((len(visits), 3))
-        measured = []
-        for number, coordinates in enumerate(deflected):
-            position, rotation = arm.pose(coordinates, point)
-            rotation = pin.exp3(turns[number]) @ rotation
-            measured.append([*(position + noise[number]), *pin.log3(rotation)])
+        measured = [
+            _disturb(arm.pose(coordinates, point), shift, turn)
+            for coordinates, shift, turn in zip(deflected, shifts, turns, strict=True)
+        ]
         rows = run.table(file).query("target == @point")
         for name, columns, expected in (
             ("visits", ["pose", "load", "repeat"], visits),
@@ -70,6 +66,20 @@ def check_simulated_campaign(
                 expected,
                 _TOLERANCE,
             )
+
+
+def _read_configuration(run: FinishedRun, file: str) -> dict[str, Any]:
+    """Document of the configuration's folder, empty where there is none."""
+    path = run.folder / "config" / file
+    return yaml.safe_load(path.read_text("utf-8")) if path.is_file() else {}
+
+
+def _disturb(
+    pose: tuple[np.ndarray, np.ndarray], shift: np.ndarray, turn: np.ndarray
+) -> list[float]:
+    """Position, m, and rotation vector, rad, of a pose with measuring noise."""
+    position, rotation = pose
+    return [*(position + shift), *pin.log3(pin.exp3(turn) @ rotation)]
 
 
 def _draw_visits(

@@ -252,16 +252,25 @@ def compute_residuals(
         angles, wrenches, rows[columns].to_numpy(), rows["target"], strict=True
     ):
         coordinates, forces = arm.deflect(springs, q, wrench, _PASSES)
-        position, rotation = arm.pose(coordinates, target)
-        residual = measured[:3] - position
-        if campaign.target_rotations:
-            predicted = rotation @ campaign.target_rotations[target]
-            error = pin.log3(pin.exp3(measured[3:]) @ predicted.T)
-            residual = np.concatenate([residual, error])
-        residuals.append(residual)
+        residuals.append(_compute_residual(campaign, coordinates, target, measured))
         jacobians.append(arm.jacobian(coordinates, target)[: len(measured)])
         loads.append(forces)
     return np.array(residuals), np.array(jacobians), np.array(loads)
+
+
+def _compute_residual(
+    campaign: AuditedCampaign,
+    coordinates: np.ndarray,
+    target: str,
+    measured: np.ndarray,
+) -> np.ndarray:
+    """Residual (3 or 6,) of one measurement at displaced coordinates, m and rad."""
+    position, rotation = campaign.arm.pose(coordinates, target)
+    residual = measured[:3] - position
+    if not campaign.target_rotations:
+        return residual
+    predicted = rotation @ campaign.target_rotations[target]
+    return np.concatenate([residual, pin.log3(pin.exp3(measured[3:]) @ predicted.T)])
 
 
 def take_least_squares_step(

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from elastocal_proof.audit.arm import Arm
 from elastocal_proof.audit.finished_run import (
     ROUNDING,
     Finding,
@@ -99,17 +100,11 @@ def check_ideal_deflections(
             0.0,
         )
         rows = run.pick(f"{file} {point}", sets * count)
-        expected = []
-        for row in rows:
-            index = divmod(int(row), count)
-            position_0, rotation_0 = arm.pose(arm.extend(angles[index]), point)
-            coordinates, _ = arm.deflect(
-                arm.springs, angles[index], wrenches[index], 1, *run.at(point)
-            )
-            position, rotation = arm.pose(coordinates, point)
-            expected.append(
-                [*(position - position_0), *pin.log3(rotation @ rotation_0.T)]
-            )
+        indices = [divmod(int(row), count) for row in rows]
+        expected = [
+            _deflect_point(arm, angles[index], wrenches[index], point, run.at(point))
+            for index in indices
+        ]
         yield compare(
             f"deflection of {point}, {len(rows)} rows",
             "pinocchio",
@@ -117,6 +112,29 @@ def check_ideal_deflections(
             expected,
             absolute=_DEFLECTION_TOLERANCE,
         )
+
+
+def _deflect_point(
+    arm: Arm,
+    angles: np.ndarray,
+    wrench: np.ndarray,
+    point: str,
+    application: tuple[Any, ...],
+) -> list[float]:
+    """Deflection of a measuring point, m and rad.
+
+    Parameters
+    ----------
+    arm : arm whose springs yield
+    angles : (n,) array, rad
+    wrench : (6,) array
+    point : name of the measuring point
+    application : where the wrench acts, as `Arm.deflect` takes it
+    """
+    position_0, rotation_0 = arm.pose(arm.extend(angles), point)
+    coordinates, _ = arm.deflect(arm.springs, angles, wrench, 1, *application)
+    position, rotation = arm.pose(coordinates, point)
+    return [*(position - position_0), *pin.log3(rotation @ rotation_0.T)]
 
 
 def check_measured_deflections(

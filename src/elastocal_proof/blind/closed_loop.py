@@ -759,35 +759,12 @@ def compute_coverage(rows: pd.DataFrame) -> pd.DataFrame:
         predicted squares.
     """
     one_model = rows["verdict"].isin(_ONE_MODEL)
-    all_rows = rows["verdict"].notna()
-    within = rows["true_rms_m"] <= rows["tolerance_m"]
     verdicts = {
         "one model": one_model,
         "several, class, unexplained": ~one_model,
-        "all": all_rows,
+        "all": rows["verdict"].notna(),
     }
-    # The rows that each question concerns, and those that count as hits.
-    questions = {
-        "rms below its 95 % bound": (
-            all_rows,
-            rows["true_rms_m"] <= rows["rms_bound_m"],
-        ),
-        "worst below its 95 % bound": (
-            all_rows,
-            rows["true_worst_m"] <= rows["worst_bound_m"],
-        ),
-        "pass that the truth denies": (rows["decision"] == "pass", ~within),
-        "fail that the truth denies": (rows["decision"] == "fail", within),
-        "prediction called wrong": (all_rows, ~rows["prediction_held"].astype(bool)),
-        "rms below its 95 % bound as measured": (
-            all_rows,
-            rows["verified_true_rms_m"] <= rows["verified_bound_m"],
-        ),
-        "pass as measured that the truth denies": (
-            rows["verified_decision"] == "pass",
-            rows["verified_true_rms_m"] > rows["tolerance_m"],
-        ),
-    }
+    questions = _answer_questions(rows)
     counts = []
     for frame, part, verdict in product(
         ("base", "tracker", "all"), STATED_PARTS, verdicts
@@ -813,6 +790,36 @@ def compute_coverage(rows: pd.DataFrame) -> pd.DataFrame:
                 }
             )
     return pd.DataFrame(counts)
+
+
+def _answer_questions(
+    rows: pd.DataFrame,
+) -> dict[str, tuple[pd.Series[bool], pd.Series[bool]]]:
+    """The rows that each question of the coverage concerns, and those that count as
+    hits."""
+    all_rows = rows["verdict"].notna()
+    within = rows["true_rms_m"] <= rows["tolerance_m"]
+    return {
+        "rms below its 95 % bound": (
+            all_rows,
+            rows["true_rms_m"] <= rows["rms_bound_m"],
+        ),
+        "worst below its 95 % bound": (
+            all_rows,
+            rows["true_worst_m"] <= rows["worst_bound_m"],
+        ),
+        "pass that the truth denies": (rows["decision"] == "pass", ~within),
+        "fail that the truth denies": (rows["decision"] == "fail", within),
+        "prediction called wrong": (all_rows, ~rows["prediction_held"].astype(bool)),
+        "rms below its 95 % bound as measured": (
+            all_rows,
+            rows["verified_true_rms_m"] <= rows["verified_bound_m"],
+        ),
+        "pass as measured that the truth denies": (
+            rows["verified_decision"] == "pass",
+            rows["verified_true_rms_m"] > rows["tolerance_m"],
+        ),
+    }
 
 
 def summarize_closed_loop(job: Any) -> None:

@@ -359,26 +359,34 @@ def draw_unit_signals(
         size = KINDS[kind].scale_plausible_size(robot.arm)
         for location in KINDS[kind].locations(robot.arm):
             draws = open_simulation_stream(seed, f"limit {kind} {location}")
-            signals = []
-            residuals = []
-            for detail_seed in draws.integers(2**31, size=_DRAWS):
-                defect = Defect(kind, location, size, int(detail_seed))
-                signal, residual = noncentrality.project_change(
-                    apply_defects(robot, [defect])
-                )
-                signals.append(signal)
-                residuals.append(residual)
-            lengths = np.linalg.norm(residuals, axis=1)
-            visible = np.flatnonzero(
-                lengths**2 > _ABSORBED * np.linalg.norm(signals, axis=1) ** 2
-            )
-            if len(visible):
+            defects = [
+                Defect(kind, location, size, int(detail_seed))
+                for detail_seed in draws.integers(2**31, size=_DRAWS)
+            ]
+            visible_units = _compute_visible_units(noncentrality, defects)
+            if len(visible_units):
                 located.append(kind)
                 # Gears without a signal are those whose torque stays below the one at
                 # which they yield. The visible draws replace them.
-                chosen = np.resize(visible, _DRAWS)
-                units.append((np.array(residuals)[chosen] / lengths[chosen, None]).T)
+                indices = np.resize(np.arange(len(visible_units)), _DRAWS)
+                units.append(visible_units[indices].T)
     return tuple(located), np.stack(units, axis=1)
+
+
+def _compute_visible_units(
+    noncentrality: NoncentralityModel, defects: Iterable[Defect]
+) -> np.ndarray:
+    """Signals of defects after absorption, scaled to length one; one row for each defect
+    of which enough is left."""
+    projections = [
+        noncentrality.project_change(apply_defects(noncentrality.robot, [defect]))
+        for defect in defects
+    ]
+    signals, residuals = np.swapaxes(projections, 0, 1)
+    lengths = np.linalg.norm(residuals, axis=1)
+    visible = lengths**2 > _ABSORBED * np.linalg.norm(signals, axis=1) ** 2
+    units: np.ndarray = residuals[visible] / lengths[visible, None]
+    return units
 
 
 def compute_log_bayes_factors(
