@@ -18,6 +18,7 @@ from support import chain_of
 from synthetic import make_estimate, make_measurements, make_model
 
 from elastocal.campaigns.campaign import Campaign, Target
+from elastocal.diagnosis.training_verdict import _state_noise
 from elastocal.effects.catalogue import declared_candidates
 from elastocal.fitting import noise as noise_module
 from elastocal.fitting.least_squares import fit_model
@@ -32,6 +33,7 @@ from elastocal.fitting.noise import (
     estimate_noise_from_repeats,
     find_declared_geometry,
     fit_declared_model,
+    get_noise,
     maximize_evidence,
     parse_noise,
     serialize_noise,
@@ -341,6 +343,12 @@ def test_noise_is_read_back_from_its_document():
     parsed = parse_noise({"noise": serialize_noise(noise), "warnings": []})
     np.testing.assert_array_equal(parsed.joint_rad, noise.joint_rad)
     assert replace(parsed, joint_rad=None) == replace(noise, joint_rad=None)
+
+
+def test_noise_is_read_back_from_a_verdict():
+    noise = Noise("declared", 1e-5, 2e-5, np.array([1e-6, 0, 3e-6]), 77, 2e-6)
+    restored = get_noise(_state_noise(noise, noise))
+    assert serialize_noise(restored) == serialize_noise(noise)
 
 
 JOINTS = (2, 3, 4, 5)

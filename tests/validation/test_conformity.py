@@ -91,8 +91,8 @@ def test_over_the_required_rotation_a_sine_changes_by_at_most_half_its_amplitude
 
 def test_joint_ranges_are_smallest_and_largest_angles_in_degrees(kuka, states):
     ranges = find_joint_ranges(states, kuka)
-    assert {entry["unit"] for entry in ranges} == {"deg"}
-    spans = [entry["high"] - entry["low"] for entry in ranges]
+    assert {ends.unit for ends in ranges} == {"deg"}
+    spans = [ends.high - ends.low for ends in ranges]
     np.testing.assert_allclose(
         spans, np.rad2deg(np.ptp(states.joint_angles, axis=0)), rtol=1e-12
     )

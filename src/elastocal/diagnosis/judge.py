@@ -26,7 +26,7 @@ from elastocal.fitting.model import (
     evaluate_conditions,
     transform_to_base,
 )
-from elastocal.fitting.noise import parse_noise
+from elastocal.fitting.noise import get_noise
 from elastocal.fitting.observations import index_poses, separate_measurements
 from elastocal.io.typed_json import from_document, to_document
 from elastocal.random_streams import open_stream
@@ -59,7 +59,6 @@ from elastocal.verdict import (
     ErrorsByRange,
     ErrorSummary,
     HeldOut,
-    JointRange,
     Remainder,
     Verdict,
 )
@@ -137,7 +136,7 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
         diagnosis.steps,
         (diagnosis.case, kept),
         outside,
-        parse_noise(diagnosis.document),
+        get_noise(diagnosis.verdict.noise),
         seed,
     )
     gross_errors = describe_gross_errors(outliers, held_out.campaign, held_out=True)
@@ -270,7 +269,7 @@ def remove_gross_errors(
         return outliers, kept, outside
     fitted_uncertainty = estimate_prediction_uncertainty(
         final,
-        parse_noise(diagnosis.document).without_pose_error,
+        get_noise(diagnosis.verdict.noise).without_pose_error,
         diagnosis.case.campaign.measurements,
     )
     is_extrapolated = outside[index_poses(measurements)]
@@ -370,10 +369,7 @@ def compare_held_out_errors(
         reduction_std_error=reductions[-1].std_error,
         poses=errors[0].poses,
         configurations=count_configurations(states),
-        joint_ranges=tuple(
-            JointRange(**limits)
-            for limits in find_joint_ranges(states, held_out.campaign.robot)
-        ),
+        joint_ranges=find_joint_ranges(states, held_out.campaign.robot),
         share_below_max=bound_share_below_maximum(errors[0].poses),
         outside_range=from_document(ErrorsByRange, by_range, "errors by range"),
         with_gross_errors=None,

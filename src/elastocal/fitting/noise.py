@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.linearization import LinearModel
     from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.observations import Observations
+    from elastocal.verdict import NoiseEstimate
 
 # Fewer contrasts of repeats than the first number do not separate the joints' part from
 # the sensor's; fewer than the second are too few to estimate any noise. The third
@@ -145,6 +146,18 @@ def parse_noise(document: Mapping[str, Any]) -> Noise:
     """
     values = {field.name: document["noise"][field.name] for field in fields(Noise)}
     return Noise(**values | {"joint_rad": np.array(values["joint_rad"])})
+
+
+def get_noise(estimate: NoiseEstimate) -> Noise:
+    """Get the noise of the measurements that a verdict states."""
+    return Noise(
+        estimate.source,
+        estimate.position_m,
+        estimate.orientation_rad,
+        np.array(estimate.joint_rad),
+        estimate.degrees_of_freedom,
+        estimate.pose_rad,
+    )
 
 
 def choose_noise(

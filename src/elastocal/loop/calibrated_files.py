@@ -283,7 +283,7 @@ def build_certificate(
         "worst_pose": _describe_worst_pose(robot, commands[0], prediction.error_m),
         "conformity": asdict(decision)
         | {"configurations": heldout.configurations, "shortfalls": missing},
-        "joint_ranges": find_joint_ranges(states, robot),
+        "joint_ranges": [asdict(ends) for ends in find_joint_ranges(states, robot)],
         "budget": [{"name": name, "rms_m": rms_m} for name, rms_m in budget.items()],
         "budget_states": accuracy.poses,
         "tracker_rms_m": float(np.sqrt(3.0) * calibrated.noise.position_m),

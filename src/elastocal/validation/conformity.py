@@ -6,13 +6,14 @@ Also: whether the validation covers enough of the robot's workspace to decide.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.campaigns.holdout import number_configurations
 from elastocal.counting import format_count
 from elastocal.fitting.observations import index_poses
+from elastocal.verdict import JointRange
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Measurements
@@ -38,11 +39,8 @@ def count_configurations(states: States | Measurements) -> int:
     return int(numbers.max()) + 1
 
 
-def find_joint_ranges(states: States, robot: Robot) -> list[dict[str, Any]]:
-    """Find the smallest and largest angle of each joint, in degrees, or m for a rail.
-
-    Each joint has "low", "high" and "unit"; the result is JSON-serialisable.
-    """
+def find_joint_ranges(states: States, robot: Robot) -> tuple[JointRange, ...]:
+    """Find the smallest and largest angle of each joint, in degrees, or m for a rail."""
     low = states.joint_angles.min(axis=0)
     high = states.joint_angles.max(axis=0)
     ranges = []
@@ -50,14 +48,9 @@ def find_joint_ranges(states: States, robot: Robot) -> list[dict[str, Any]]:
         limits = np.array([low[joint], high[joint]])
         if not is_rail:
             limits = np.rad2deg(limits)
-        ranges.append(
-            {
-                "low": float(limits[0]),
-                "high": float(limits[1]),
-                "unit": "m" if is_rail else "deg",
-            }
-        )
-    return ranges
+        unit = "m" if is_rail else "deg"
+        ranges.append(JointRange(float(limits[0]), float(limits[1]), unit))
+    return tuple(ranges)
 
 
 def list_shortfalls(configurations: int, fitted: States, robot: Robot) -> list[str]:

@@ -261,7 +261,7 @@ def compute_residuals(
 def _compute_residual(
     campaign: AuditedCampaign,
     coordinates: np.ndarray,
-    target: str,
+    target: int,
     measured: np.ndarray,
 ) -> np.ndarray:
     """Residual (3 or 6,) of one measurement at displaced coordinates, m and rad."""
@@ -270,7 +270,8 @@ def _compute_residual(
     if not campaign.target_rotations:
         return residual
     predicted = rotation @ campaign.target_rotations[target]
-    return np.concatenate([residual, pin.log3(pin.exp3(measured[3:]) @ predicted.T)])
+    error = np.array(pin.log3(pin.exp3(measured[3:]) @ predicted.T))
+    return np.concatenate([residual, error])
 
 
 def take_least_squares_step(
