@@ -1,7 +1,7 @@
 """Elastostatic calibration of serial robots: the science, importable without the
 pipeline that runs it.
 
-Its rooms stand in `[tool.importlinter]` of pyproject.toml, from the ground up;
+Its packages and their layers stand in `[tool.importlinter]` of pyproject.toml, from the ground up;
 docs/architecture.md says what each is for. What proves it is a package of its own,
 `elastocal_proof`, which `elastocal demo` alone imports.
 """

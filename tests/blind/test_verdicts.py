@@ -7,7 +7,8 @@ import sys
 import pytest
 from made_folders import make_folder, make_table
 
-# Runs the step in a process of its own, and reports opened files and imported modules.
+# This program runs the step in a process of its own, and reports which files it opened
+# and which modules it imported.
 WATCHED = """
 import json, sys
 from types import SimpleNamespace

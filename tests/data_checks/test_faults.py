@@ -353,8 +353,8 @@ def test_without_differing_loads_known_compliances_or_enough_poses_there_is_no_r
 
 
 def made_deflections(sign=1.0, force=1.0, moment=1.0, ratios=1.0, noise=1e-2):
-    """Of joints that are so many times as soft as in the file, seen as loads in another
-    unit make them seen."""
+    """Simulate the deflections of joints whose compliances are multiples (`ratios`) of
+    those in the robot file, as they appear when the loads are in another unit."""
     rng = np.random.default_rng(1)
     by_force, by_moment = 1e-3 * rng.standard_normal((2, 450, JOINTS))
     measured = (

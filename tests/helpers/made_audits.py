@@ -173,5 +173,5 @@ def altered(folder, file, address, change):
 
 
 def failed(findings):
-    """Return what was checked by the findings that do not hold."""
+    """List the names of the checks that failed."""
     return [finding.checked for finding in findings if not finding.holds]

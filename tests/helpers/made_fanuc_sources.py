@@ -43,7 +43,8 @@ def static_source(fanuc, folder):
 
 
 def cpa_source(fanuc, folder):
-    """Do the same for the source that moves one joint at a time."""
+    """Write the files of the source that moves one joint at a time. Returns its path,
+    the joint angles and the positions of the reflectors."""
     degrees = np.random.default_rng(3).uniform(-50, 50, (POSES, 6))
     angles = model_angles(degrees, degrees[:, 1] + degrees[:, 2])
     positions = reflectors(fanuc.chain, angles, 4)

@@ -41,7 +41,7 @@ from statsmodels.stats.proportion import proportion_confint
 # Time for the tests of one mutant.
 SECONDS = 20.0
 PACKAGE = Path("src/elastocal")
-ROOMS = (
+PACKAGES = (
     "mechanics",
     "study",
     "effects",
@@ -104,13 +104,13 @@ def draw(seed, size):
     """Draw `size` mutants of each package without replacement, as a table with one row a
     mutant."""
     rows = []
-    for room in ROOMS:
+    for package in PACKAGES:
         population = [
             (mutant, path)
-            for path in sorted(PACKAGE.glob(f"{room}/**/*.py"))
+            for path in sorted(PACKAGE.glob(f"{package}/**/*.py"))
             for mutant in read_exit_codes(path)
         ]
-        random.Random(f"{seed} {room}").shuffle(population)
+        random.Random(f"{seed} {package}").shuffle(population)
         descriptions = (describe_mutant(mutant, path) for mutant, path in population)
         rows += islice(filter(None, descriptions), size)
     return pd.DataFrame(rows)
@@ -119,7 +119,7 @@ def draw(seed, size):
 def run(mutants, room):
     """Test mutants of one package by the tests of the package that cover them, from the
     fastest one on, up to `SECONDS` for a mutant."""
-    config().pytest_add_cli_args_test_selection = [f"tests/{room}"]
+    config().pytest_add_cli_args_test_selection = [f"tests/{package}"]
     Path("mutants/mutmut-stats.json").unlink(missing_ok=True)
     durations = state().duration_by_test
     covering = state().tests_by_mangled_function_name

@@ -15,7 +15,7 @@ from elastocal.report.typesetting import compile_document, load_template
 from elastocal.study.strategies import Stage, Strategy
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
-# By the names that the report has for them.
+# Golden table that stands for each table of the report.
 FILES = {
     "joint": "joint_test",
     "studies": "strategies_over_studies",

@@ -714,8 +714,8 @@ def _evaluate_matern(
 def _compute_features(
     points: np.ndarray, inputs: np.ndarray, prior_factor: np.ndarray, variance: float
 ) -> np.ndarray:
-    """Covariances of the process at inputs (M, d) with its whitened values at the N
-    inducing points, (N, M) array."""
+    """Compute the covariances (N, M) between the process at inputs (M, d) and its
+    whitened values at the N inducing points."""
     covariance = variance * _evaluate_matern(points, inputs)[0]
     return lapack.dtrtrs(prior_factor, covariance, lower=1)[0]
 
