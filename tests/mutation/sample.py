@@ -90,7 +90,7 @@ def describe_mutant(mutant, path):
     line = source.count("\n", 0, source.index(removed[0], function)) + 1
     module = path.relative_to(PACKAGE)
     return {
-        "room": module.parts[0],
+        "package": module.parts[0],
         "module": module.as_posix(),
         "line": line,
         "function": f"{owner}.{name}" if owner else name,
@@ -116,7 +116,7 @@ def draw(seed, size):
     return pd.DataFrame(rows)
 
 
-def run(mutants, room):
+def run(mutants, package):
     """Test mutants of one package by the tests of the package that cover them, from the
     fastest one on, up to `SECONDS` for a mutant."""
     config().pytest_add_cli_args_test_selection = [f"tests/{package}"]
@@ -165,7 +165,7 @@ def compute_scores(sample):
     """Compute the share of mutants that the tests detect, with Wilson's 95 % interval, for
     each package and for all."""
     rows = []
-    for room, mutants in [*sample.groupby("room", sort=False), ("all", sample)]:
+    for package, mutants in [*sample.groupby("package", sort=False), ("all", sample)]:
         detected = mutants["status"].isin(["killed", "timeout"]).sum()
         low, high = proportion_confint(detected, len(mutants), method="wilson")
         counts = {
@@ -173,23 +173,23 @@ def compute_scores(sample):
             for status in sample["status"].unique()
         }
         rows.append(
-            {"room": room}
+            {"package": package}
             | counts
             | {"score": detected / len(mutants), "low": low, "high": high}
         )
     return pd.DataFrame(rows)
 
 
-def evaluate_mutants(room, mutants):
+def evaluate_mutants(package, mutants):
     """Test the mutants of one package, and return their table with a column of
     statuses."""
-    run(list(mutants["mutant"]), room)
+    run(list(mutants["mutant"]), package)
     codes = {}
     for module in mutants["module"].unique():
         codes |= read_exit_codes(PACKAGE / module)
     statuses = [status_by_exit_code[codes[mutant]] for mutant in mutants["mutant"]]
     mutants = mutants.assign(status=statuses)
-    if room == "study":
+    if package == "study":
         uncovered = mutants["mutant"][mutants["status"] == "no tests"]
         if len(uncovered) and is_detected_by_the_study(""):
             raise AssertionError(
@@ -208,11 +208,11 @@ if __name__ == "__main__":
     seed, size = map(int, sys.argv[1:3]) if sys.argv[1:] else (1, 25)
     make_mutants()
     sample = draw(seed, size)
-    sample = sample[sample["room"].isin(sys.argv[3:] or sample["room"])]
+    sample = sample[sample["package"].isin(sys.argv[3:] or sample["package"])]
     copy_also_copy_files()
     setup_source_paths()
     tested = []
-    for room, mutants in sample.groupby("room", sort=False):
-        tested.append(evaluate_mutants(room, mutants))
+    for package, mutants in sample.groupby("package", sort=False):
+        tested.append(evaluate_mutants(package, mutants))
         pd.concat(tested).to_csv("reports/mutants.csv", index=False)
     print(compute_scores(pd.concat(tested)).round(2).to_string(index=False))
