@@ -8,16 +8,47 @@ from importlib import import_module
 HEAD = """Programming interface
 =====================
 
-The public functions and classes of ``elastocal``, from their docstrings. None of them
-needs Snakemake or a configuration file. Everything else is internal and may change; its
-docstrings are in the source.
+From arrays to a corrected robot::
+
+    import elastocal as ec
+
+    robot = ec.read_robot("arm.urdf", base="base_link", tip="tool0")
+    campaign = ec.Campaign(robot, joint_angles=q, positions=x, wrenches=w)
+    result = ec.diagnose(campaign)
+    targets = result.robot.correct(path)
+    result.report("report.pdf")
+
+The names of the first five sections are imported from ``elastocal`` itself; they are
+stable, and a name that changes keeps working for one release with a warning. Names below
+are those of the modules that they are imported from. None of them needs Snakemake or a
+configuration file. Everything else is internal and may change.
 
 """
 # Modules, each with the names that are shown.
 INTERFACE = {
     "Read a robot and a campaign": {
-        "elastocal.campaigns.reading": ("read_robot", "read_campaign"),
-        "elastocal.campaigns.campaign_folder": ("read_campaign_folder",),
+        "elastocal.interface.robots": ("read_robot",),
+        "elastocal.interface.campaigns": ("Campaign", "read_campaign"),
+        "elastocal.errors": ("InputError",),
+    },
+    "Plan, simulate and check": {
+        "elastocal.interface.planning": (
+            "plan",
+            "MeasurementPlan",
+            "simulate",
+            "check",
+        ),
+    },
+    "Diagnose a robot": {
+        "elastocal.interface.diagnoses": ("diagnose", "DiagnosisResult"),
+        "elastocal.interface.plots": ("Plots",),
+    },
+    "Correct a robot": {
+        "elastocal.interface.corrected_robot": ("CorrectedRobot",),
+        "elastocal.application.path_correction": ("CorrectedPath",),
+    },
+    "Compare diagnoses": {
+        "elastocal.interface.comparison": ("compare", "Comparison"),
     },
     "Move a robot": {
         "elastocal.mechanics.kinematics": (

@@ -12,14 +12,17 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+import yaml
 
 from elastocal.application.calibrated import predict_poses, remove_effects
 from elastocal.application.frames import root_mean_square, subtract_placement
 from elastocal.effects.conditions import MASS_PARAMETERS
 from elastocal.exchange.urdf import read_urdf
 from elastocal.exchange.urdf_writing import find_nominal_chain
+from elastocal.io.atomic_writes import write_text
 from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
 from elastocal.mechanics.kinematics import compute_pose_differences, compute_poses
+from elastocal.mechanics.robot_file import describe_robot
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -85,6 +88,17 @@ def fold_effects(calibrated: CalibratedRobot) -> FoldedRobot:
         reported_offset=ratio @ robot.reported_offset + offset,
     )
     return FoldedRobot(folded, tuple(left_out))
+
+
+def write_robot_file(path: str | Path, folded: FoldedRobot, campaign: str) -> None:
+    """Write a calibrated robot as a robot file, which names its campaign."""
+    text = yaml.safe_dump(
+        describe_robot(folded.robot),
+        sort_keys=False,
+        default_flow_style=None,
+        width=128,
+    )
+    write_text(path, f"# Calibrated by elastocal from the campaign {campaign}.\n{text}")
 
 
 def _correct_masses(robot: Robot, corrections: np.ndarray) -> Robot:

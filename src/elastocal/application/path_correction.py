@@ -112,6 +112,11 @@ class CorrectedPath:
         return np.asarray(self.status == OK)
 
     @property
+    def table(self) -> pd.DataFrame:
+        """Joint targets and their errors, see `tabulate_targets`."""
+        return tabulate_targets(self)
+
+    @property
     def count(self) -> str:
         """Number of targets in words."""
         return format_count(len(self.wanted), "target")

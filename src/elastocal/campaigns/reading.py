@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from elastocal.campaigns.campaign import (
+    DEFAULT_HOLDOUT,
     DOCUMENT,
     Campaign,
     Measurements,
@@ -73,21 +74,44 @@ def read_campaign(
     """
     document = folder.document
     robot = folder.robot
-    source = folder.source
-    targets = parse_targets(document["targets"], robot.chain, source)
-    # Refuse a folder that cannot validate this campaign before reading measurements.
+    # Refuse what the documents alone show before reading measurements.
+    parse_targets(document["targets"], robot.chain, folder.source)
     _ = folder.held_out_path
     if effects is not None:
-        _check_declared(document, effects, source)
+        check_declared(document, effects, folder.source)
     table = read_measurements(folder.path, robot.joints, document["measured"])
-    measurements = _build_measurements(table, robot, targets, document["measured"])
+    file = {"table": Path(table.path).name, "header_line": table.header_line}
+    return build_campaign(document | file, robot, table, folder.source)
+
+
+def build_campaign(
+    document: Mapping[str, Any], robot: Robot, table: Cells, source: str
+) -> Campaign:
+    """Build a campaign from a table of measurements, and check it as a whole.
+
+    Parameters
+    ----------
+    document : contents of ``campaign.yaml``, valid by its schema; may also have
+        ``table`` and ``header_line`` of `Campaign`.
+    robot : nominal robot.
+    table : measurements, with all columns that they need.
+    source : file of the document, for messages.
+
+    Raises
+    ------
+    InputError
+        As `read_campaign`.
+    """
+    measured = document["measured"]
+    targets = parse_targets(document["targets"], robot.chain, source)
+    measurements = _build_measurements(table, robot, targets, measured)
     _check_measurements(measurements, table, robot, targets)
     _check_targets_measured(measurements, table, targets, source)
-    _check_compliance(folder, measurements)
+    _check_compliance(document, robot, measurements, source)
     _check_noise(document.get("noise"), measurements, robot, source)
-    select_held_out(folder.holdout, measurements, robot.reported_offset, source)
-    file = {"table": Path(table.path).name, "header_line": table.header_line}
-    return assemble_campaign(document | file, robot, measurements, source)
+    holdout = document.get("holdout", DEFAULT_HOLDOUT)
+    select_held_out(holdout, measurements, robot.reported_offset, source)
+    return assemble_campaign(document, robot, measurements, source)
 
 
 def read_robot(path: str | Path) -> Robot:
@@ -154,7 +178,7 @@ def find_degrees(reported: np.ndarray, robot: Robot) -> np.ndarray:
     return in_degrees
 
 
-def _check_declared(
+def check_declared(
     document: Mapping[str, Any], effects: Collection[str], source: str
 ) -> None:
     """Refuse a declared effect that the catalogue does not have."""
@@ -164,14 +188,16 @@ def _check_declared(
             raise InputError(source, f"declared[{index}]", repr(name), allowed)
 
 
-def _check_compliance(folder: CampaignFolder, measurements: Measurements) -> None:
+def _check_compliance(
+    document: Mapping[str, Any], robot: Robot, measurements: Measurements, source: str
+) -> None:
     """Refuse loads on joints whose compliances are neither stated nor identified."""
-    nominal = folder.document.get("compliance", "nominal") == "nominal"
-    if nominal and not folder.robot.compliance_known and measurements.wrench.any():
-        file = folder.robot_file.name
+    nominal = document.get("compliance", "nominal") == "nominal"
+    if nominal and not robot.compliance_known and measurements.wrench.any():
+        file = Path(document["robot"]).name
         finding = f"nominal, but no compliance_urad_per_Nm in {file}, and loads"
         allowed = "identify, or nominal with compliance_urad_per_Nm in the robot file"
-        raise InputError(folder.source, "compliance", finding, allowed)
+        raise InputError(source, "compliance", finding, allowed)
 
 
 def _check_noise(

@@ -57,6 +57,7 @@ def export(
         compute_urdf_deviation_m,
         compute_urdf_poses,
         fold_effects,
+        write_robot_file,
     )
     from elastocal.application.statements import format_accuracy
     from elastocal.exchange.urdf_writing import write_calibrated_origins
@@ -82,7 +83,7 @@ def export(
     if urdf is not None:
         corrected = write_calibrated_origins(urdf, nominal, folded.robot)
     with write_together(output, (ROBOT, URDF)) as partial:
-        _write_robot(partial / ROBOT, folded, campaign.name)
+        write_robot_file(partial / ROBOT, folded, campaign.name)
         if corrected is not None:
             (partial / URDF).write_bytes(corrected.content)
             urdf_poses = compute_urdf_poses(
@@ -156,22 +157,6 @@ def _format_size(displacements_m: np.ndarray) -> str:
     rms_mm = 1e3 * float((displacements_m**2).mean()) ** 0.5
     largest_mm = 1e3 * displacements_m.max()
     return f"up to {largest_mm:.3f} mm at the measured poses ({rms_mm:.3f} mm RMS)"
-
-
-def _write_robot(path: Path, folded: FoldedRobot, campaign: str) -> None:
-    """Write the robot file."""
-    import yaml
-
-    from elastocal.io.atomic_writes import write_text
-    from elastocal.mechanics.robot_file import describe_robot
-
-    text = yaml.safe_dump(
-        describe_robot(folded.robot),
-        sort_keys=False,
-        default_flow_style=None,
-        width=128,
-    )
-    write_text(path, f"# Calibrated by elastocal from the campaign {campaign}.\n{text}")
 
 
 def _describe_urdf(corrected: CorrectedUrdf, deviation_m: float) -> list[str]:

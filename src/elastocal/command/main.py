@@ -12,6 +12,7 @@ from typer.core import TyperGroup
 import elastocal
 from elastocal.command.campaign import check, diagnose, init
 from elastocal.command.certificate import certificate
+from elastocal.command.comparison import compare
 from elastocal.command.correct import correct
 from elastocal.command.demo import demo
 from elastocal.command.export import export
@@ -33,6 +34,7 @@ COMMANDS: dict[Callable[..., None], str] = {
     certificate: "campaigns/cell --tolerance 0.2mm",
     verify: "campaigns/cell measured.csv",
     export: "campaigns/cell --output calibrated",
+    compare: "campaigns/cell campaigns/cell_round2",
 }
 
 

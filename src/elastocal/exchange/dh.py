@@ -191,14 +191,36 @@ def robot_from_dh(
         document["joint_names"] = table.joint_names
     if table.limits:
         document["joint_limits_deg"] = table.limits
+    notes = [*table.notes, _NO_MASSES]
+    if not table.limits:
+        notes.append(_NO_LIMITS)
+    document["chain"], chain_notes = _format_chain(table, modified=modified)
+    notes += chain_notes
+    notation = "modified" if modified else "standard"
+    description = f"{notation} Denavit-Hartenberg parameters"
+    return check_imported(document, path, description, notes)
+
+
+def format_dh_chain(rows: np.ndarray, *, modified: bool = False) -> str:
+    """Format the chain of Denavit-Hartenberg parameters.
+
+    Parameters
+    ----------
+    rows : (n, 4) array, theta, d, a and alpha of each revolute joint, rad and m
+    modified : whether they are in Craig's modified notation
+    """
+    table = _DhTable([], rows, [_REVOLUTE] * len(rows), [], [])
+    return _format_chain(table, modified=modified)[0]
+
+
+def _format_chain(table: _DhTable, *, modified: bool) -> tuple[str, list[str]]:
+    """Format the chain of a table; also returns notes about its lengths."""
     rows = [*_split_rows(table, modified=modified)]
     tokens = _format_rows(rows)
     short_tokens = _format_short_chain(rows)
     length = _sum_lengths(tokens)
     short_length = _sum_lengths(short_tokens)
-    notes = [*table.notes, _NO_MASSES]
-    if not table.limits:
-        notes.append(_NO_LIMITS)
+    notes = []
     if short_length < _MUCH_SHORTER * length:
         tokens = short_tokens
         notes.append(
@@ -206,10 +228,7 @@ def robot_from_dh(
             f" {short_length:.4g} m in the chain, whose joints are at other places of"
             " the same axes: the pose at the end is the same"
         )
-    document["chain"] = " ".join([*tokens, "[flange]"])
-    notation = "modified" if modified else "standard"
-    description = f"{notation} Denavit-Hartenberg parameters"
-    return check_imported(document, path, description, notes)
+    return " ".join([*tokens, "[flange]"]), notes
 
 
 def _names_joints(table: _DhTable, source: str) -> bool:

@@ -12,12 +12,10 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
-import pandas as pd
 
-from elastocal.campaigns.holdout import number_close_points
 from elastocal.campaigns.tables import Cells, TextTable, read_text_table
 from elastocal.counting import format_count
 from elastocal.errors import InputError, find_text_fault, suggest_names
@@ -35,6 +33,7 @@ from elastocal.exchange.column_names import (
     recognize_column,
 )
 from elastocal.exchange.joining import join_files, join_to_sheet
+from elastocal.exchange.numbering import number_loads_and_repeats, number_poses
 from elastocal.exchange.pose_table import (
     PoseTable,
     TableOptions,
@@ -44,13 +43,9 @@ from elastocal.exchange.pose_table import (
 )
 from elastocal.exchange.times import find_times_of_day, read_times
 from elastocal.exchange.unwrapping import unwrap_into_limits
-from elastocal.io.storage import Columns
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 
-# Joint angles that differ by less, rad, belong to one pose: a controller reports one
-# standstill twice within this tolerance, and poses of a plan lie degrees apart.
-SAME_POSE = 1e-3
 # What programs write into a cell without a measurement.
 _EMPTY = re.compile(
     r"|[+-]?nan(\(\w+\))?|[-–—]+|#?n/?a|n\.a\.|null|none", re.IGNORECASE
@@ -475,7 +470,7 @@ def _read_columns(
     cells: Cells, layout: PoseTable, options: ImportOptions, joint_angles: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Read all columns that measurements need, with these joint angles (N, n)."""
-    table = _number_poses(cells, joint_angles)
+    table = number_poses(cells, joint_angles)
     table |= dict(zip(layout.angles, joint_angles.T, strict=True))
     if layout.wrench:
         sign = -1.0 if options.wrench == "by-robot" else 1.0
@@ -495,7 +490,7 @@ def _read_columns(
         if approach in layout.columns:
             table[approach] = cells.numbers(approach)
     table["target"] = _read_targets(cells, options.target)
-    return table | _number_loads_and_repeats(cells, table)
+    return table | number_loads_and_repeats(cells, table)
 
 
 def _read_joint_angles(
@@ -580,54 +575,3 @@ def _read_targets(cells: Cells, stated_name: str | None) -> np.ndarray:
         if fault:
             raise InputError(source, key, *fault)
     return np.array(names)
-
-
-def _number_poses(cells: Cells, joint_angles: np.ndarray) -> dict[str, np.ndarray]:
-    """Read session and pose; a pose that no column numbers consists of the rows with
-    the same joint angles."""
-    table: dict[str, Any] = {}
-    if "session" in cells.columns:
-        table["session"] = cells.integers("session")
-    if "pose" not in cells.columns:
-        table["pose"] = number_close_points(joint_angles, SAME_POSE) + 1
-        return table
-    labels = cells.texts("pose")
-    if all(label.isdigit() for label in labels):
-        table["pose"] = cells.integers("pose")
-    else:
-        table["pose"] = pd.factorize(pd.Series(labels))[0] + 1
-    return table
-
-
-def _number_loads_and_repeats(cells: Cells, table: Columns) -> dict[str, np.ndarray]:
-    """Read loads and repeats from their columns, or count them in the order in which
-    they first appear."""
-    states = pd.DataFrame(
-        {
-            "session": table.get("session", 0),
-            "pose": table["pose"],
-            "target": table["target"],
-        }
-    )
-    if "load" in cells.columns:
-        states["load"] = cells.integers("load")
-    else:
-        states["load"] = _number_loads(states[["session", "pose"]], table)
-    if "repeat" in cells.columns:
-        states["repeat"] = cells.integers("repeat")
-    else:
-        same_state = states.groupby(["session", "pose", "load", "target"])
-        states["repeat"] = same_state.cumcount()
-    return {name: states[name].to_numpy() for name in ("load", "repeat")}
-
-
-def _number_loads(poses: pd.DataFrame, table: Columns) -> pd.Series[int]:
-    """Number the different wrenches of each pose from 1; no wrench is load 0."""
-    wrench = pd.DataFrame(
-        {name: table.get(name, 0.0) for name in WRENCH_NAMES}, index=poses.index
-    )
-    loads = pd.concat([poses, wrench], axis=1)
-    different = loads[wrench.any(axis=1)].drop_duplicates()
-    different["load"] = different.groupby(["session", "pose"]).cumcount() + 1
-    merged = loads.merge(different, how="left")
-    return merged["load"].fillna(0).astype(np.int64)

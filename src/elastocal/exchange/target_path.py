@@ -140,6 +140,40 @@ def read_target_path(
     return TargetPath(position, rotation, start, wrench, text.lines)
 
 
+def build_target_path(
+    poses: np.ndarray, start: np.ndarray | None, wrench: np.ndarray | None
+) -> TargetPath:
+    """Build a path of poses that no file states; lines count from 1.
+
+    Parameters
+    ----------
+    poses : (N, 6) positions, m, and rotation vectors, rad, base axes.
+    start : (N, n) joint angles of the postures, rad; None if free.
+    wrench : (N, 6) loads, N and N m; None for no loads.
+
+    Raises
+    ------
+    InputError
+        A pose is not finite or farther than any arm reaches.
+    """
+    largest = np.r_[np.full(3, _FARTHEST_M), np.full(3, LARGEST_ROTATION_RAD)]
+    # A comparison with NaN is false, so that NaN is refused too.
+    wrong = ~(np.abs(poses) <= largest)
+    if wrong.any():
+        row, column = np.argwhere(wrong)[0]
+        name = _POSE[column]
+        raise InputError(
+            "path",
+            f"row {row + 1}, column {name}",
+            f"{poses[row, column]:g}",
+            f"{largest[column]:.3g} at most, in m or rad",
+        )
+    # The table of a caller may be read-only, which scipy does not accept.
+    rotation = Rotation.from_rotvec(poses[:, 3:].copy()).as_matrix()
+    lines = tuple(range(1, len(poses) + 1))
+    return TargetPath(poses[:, :3], rotation, start, wrench, lines)
+
+
 def _find_poses(
     text: TextTable,
     angles: Sequence[str],

@@ -325,30 +325,46 @@ def draw_before_after(
     noise_floor_m : float, m
         RMS error that the noise alone leaves.
     """
-    labels = [_label_model(step["step"]) for step in steps]
-    line_counts = [label.count("\n") + 1 for label in labels]
-    height_mm = 30 + 4.0 * sum(line_counts) + 4.5 * len(steps)
+    lines = sum(_label_model(step["step"]).count("\n") + 1 for step in steps)
+    height_mm = 30 + 4.0 * lines + 4.5 * len(steps)
     figure, axes = create_panels(1, len(METRICS), height_mm, sharey=True)
-    heights = 0.55 + 0.45 * np.array(line_counts)
-    rows = np.cumsum(heights) - heights / 2
-    factor, unit = choose_length_unit(_collect_errors(steps, "heldout").max())
-    logarithmic_range = _find_logarithmic_range(steps, noise_floor_m)
-    for axis, (metric, title) in zip(axes[0], METRICS.items(), strict=True):
-        _draw_model_bars(axis, steps, metric, rows, factor)
-        if noise_floor_m:
-            axis.axvline(factor * noise_floor_m, gid="noise floor", **_NOISE_STYLE)
-        axis.set(title=title, xlabel=f"error ({unit})")
-        _scale_error_axis(axis, logarithmic_range, factor)
-        axis.grid(visible=False, axis="y")
-        axis.set_axisbelow(True)
-    axes[0, 0].set(yticks=rows, ylim=(heights.sum(), 0))
-    axes[0, 0].set_yticklabels(labels, fontsize=7.5)
+    for axis, metric in zip(axes[0], METRICS, strict=True):
+        draw_model_errors(axis, steps, metric, noise_floor_m)
     handles = _explain_model_bars({step["kind"] for step in steps})
     if noise_floor_m:
         label = "RMS that noise alone leaves"
         handles.append(Line2D([], [], label=label, **_NOISE_STYLE))
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
+
+
+def draw_model_errors(
+    axis: Axes, steps: Sequence[Row], metric: str, noise_floor_m: float | None = None
+) -> None:
+    """Draw bars of one error on held-out poses, one row for each model.
+
+    Parameters
+    ----------
+    axis
+        Axes on which to draw.
+    steps, noise_floor_m
+        As of `draw_before_after`.
+    metric
+        A key of `METRICS`.
+    """
+    labels = [_label_model(step["step"]) for step in steps]
+    heights = 0.55 + 0.45 * np.array([label.count("\n") + 1 for label in labels])
+    rows = np.cumsum(heights) - heights / 2
+    factor, unit = choose_length_unit(_collect_errors(steps, "heldout").max())
+    _draw_model_bars(axis, steps, metric, rows, factor)
+    if noise_floor_m:
+        axis.axvline(factor * noise_floor_m, gid="noise floor", **_NOISE_STYLE)
+    axis.set(title=METRICS[metric], xlabel=f"error ({unit})")
+    _scale_error_axis(axis, _find_logarithmic_range(steps, noise_floor_m), factor)
+    axis.grid(visible=False, axis="y")
+    axis.set_axisbelow(True)
+    axis.set(yticks=rows, ylim=(heights.sum(), 0))
+    axis.set_yticklabels(labels, fontsize=7.5)
 
 
 def _scale_error_axis(
@@ -526,6 +542,13 @@ def draw_probabilities(posterior: Probabilities | None, table: Columns) -> Figur
     )
     figure.legend(handles=handles, title=title, loc="outside lower center", ncols=4)
     return figure
+
+
+def draw_hypotheses(axis: Axes, posterior: Probabilities) -> None:
+    """Draw the posterior probabilities of the leading hypotheses on given axes."""
+    hypotheses = _list_hypotheses(posterior.sets[:_SHOWN_HYPOTHESES])
+    heights_mm = _compute_row_heights([label for label, _ in hypotheses])
+    _draw_hypotheses(axis, hypotheses, heights_mm)
 
 
 def _list_hypotheses(sets: Sequence[MechanismSet]) -> list[tuple[str, float]]:

@@ -613,6 +613,11 @@ def build_case(
     campaign = assemble_campaign(
         descriptions["campaign"], robot, build_measurements(columns), source
     )
+    return prepare_case(campaign, source)
+
+
+def prepare_case(campaign: Campaign, source: str) -> Case:
+    """Prepare the fit of a campaign; `source` is its file, for messages."""
     sites = build_sites(campaign.robot)
     model = build_declared_model(
         campaign, declared_candidates(campaign.declared, sites, source)

@@ -51,10 +51,12 @@ from elastocal.verdict import read_verdict
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+    from elastocal.application.accuracy import ErrorPrediction
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.fitting.model import Case
     from elastocal.io.records import JobRecord
     from elastocal.mechanics.robot import Robot
+    from elastocal.validation.conformity import Conformity
     from elastocal.verdict import Verdict
 
 
@@ -245,15 +247,12 @@ def build_certificate(
     commands = select_campaign_commands(calibrated)
     prediction = predict_errors(calibrated, *commands)
     accuracy = prediction.summarize(REGION)
-    decision = decide_conformity(prediction.rms_m, tolerance_m, accepted_risk)
-    missing = list_shortfalls(heldout.configurations, states, robot)
-    if not accuracy.fitted:
-        missing.insert(
-            0,
-            "nothing fitted: no error is predicted for a robot without fitted parameters",
-        )
-    if missing and decision.decision == PASS:
-        decision = replace(decision, decision=UNDECIDED)
+    decision, missing = decide_by_prediction(
+        prediction,
+        list_shortfalls(heldout.configurations, states, robot),
+        tolerance_m,
+        accepted_risk,
+    )
     budget = {"before": heldout.before.rms_m}
     budget |= compute_error_budget(calibrated, *commands)
     return {
@@ -288,6 +287,41 @@ def build_certificate(
         "budget_states": accuracy.poses,
         "tracker_rms_m": float(np.sqrt(3.0) * calibrated.noise.position_m),
     }
+
+
+def decide_by_prediction(
+    prediction: ErrorPrediction,
+    shortfalls: list[str],
+    tolerance_m: float,
+    accepted_risk: float,
+) -> tuple[Conformity, list[str]]:
+    """Decide whether a corrected robot keeps a tolerance, by its predicted errors.
+
+    Parameters
+    ----------
+    prediction : ErrorPrediction
+        Errors at the poses and loads of the campaign.
+    shortfalls : list of str
+        Reasons why the validation says too little, see `list_shortfalls`.
+    tolerance_m : float
+        Largest allowed RMS position error, m.
+    accepted_risk : float
+        Accepted probability of a wrong decision.
+
+    Returns
+    -------
+    decision : Conformity
+        Undecided instead of a pass if there is any shortfall.
+    shortfalls : list of str
+        With the missing fit, if nothing was fitted.
+    """
+    decision = decide_conformity(prediction.rms_m, tolerance_m, accepted_risk)
+    if not prediction.summarize(REGION).fitted:
+        sentence = "nothing fitted: no error is predicted for a robot without fitted parameters"
+        shortfalls = [sentence, *shortfalls]
+    if shortfalls and decision.decision == PASS:
+        decision = replace(decision, decision=UNDECIDED)
+    return decision, shortfalls
 
 
 def _describe_worst_pose(

@@ -32,9 +32,10 @@ from elastocal.random_streams import open_stream
 from elastocal.verdict import TrainingVerdict
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
+    from elastocal.diagnosis.next_experiment import Table
     from elastocal.diagnosis.verdict import Evidence
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.least_squares import Fit
@@ -57,19 +58,12 @@ def diagnose_campaign(job: Any) -> None:
     case = load_case(job.input.descriptions, job.input.training)
     name = job.wildcards.campaign
     seed = job.params.seed
-    diagnosis = diagnose(
+    diagnosis, experiment = diagnose_with_proposal(
         case,
-        Settings(),
         seed,
+        job.params.states,
         lambda line: print(f"{name}: {line}", file=sys.stderr, flush=True),
     )
-    experiment, proposal = propose_experiment(
-        diagnosis,
-        open_stream(seed, case.campaign.name, "next experiment", 0),
-        job.params.states,
-    )
-    verdict = replace(diagnosis.verdict, next_experiment=proposal)
-    diagnosis = replace(diagnosis, verdict=verdict)
     write_csv(job.output.experiment, pd.DataFrame(experiment))
     write_csv(job.output.candidates, pd.DataFrame(tabulate_candidates(diagnosis)))
     covariance = diagnosis.final.covariance.tolist()
@@ -83,6 +77,36 @@ def diagnose_campaign(job: Any) -> None:
         generate_step_blocks(diagnosis),
         describe_provenance(job.params, **job.wildcards),
     )
+
+
+def diagnose_with_proposal(
+    case: Case, seed: int, states: int, report_progress: Callable[[str], None]
+) -> tuple[Diagnosis, Table]:
+    """Diagnose the training poses and propose the next experiment.
+
+    Parameters
+    ----------
+    case : Case
+        Training poses.
+    seed : int
+        Seed of all random streams.
+    states : int
+        Number of proposed poses.
+    report_progress : callable
+        Takes a line on each stage of the diagnosis.
+
+    Returns
+    -------
+    diagnosis : Diagnosis
+        Its verdict contains a summary of the proposal.
+    experiment : Table
+        Columns of the proposed poses, see `propose_experiment`.
+    """
+    diagnosis = diagnose(case, Settings(), seed, report_progress)
+    stream = open_stream(seed, case.campaign.name, "next experiment", 0)
+    experiment, proposal = propose_experiment(diagnosis, stream, states)
+    verdict = replace(diagnosis.verdict, next_experiment=proposal)
+    return replace(diagnosis, verdict=verdict), experiment
 
 
 def load_case(

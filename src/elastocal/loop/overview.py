@@ -103,6 +103,20 @@ def inspect_campaign(folder: str | Path, robots_folder: str | Path) -> Overview:
         read_campaign_folder(folder, robots_folder)
     )
     whole = build_case(descriptions, tabulate_measurements(training))
+    return inspect_case(whole, held_out)
+
+
+def inspect_case(whole: Case, held_out: Measurements) -> Overview:
+    """Inspect the fitted and the held-out measurements of a campaign.
+
+    Parameters
+    ----------
+    whole : Case
+        The measurements to fit.
+    held_out : Measurements
+        The measurements that validate.
+    """
+    training = whole.campaign.measurements
     settings = Settings()
     subset = select_initial_subset(whole, settings)
     case = subset.case

@@ -42,14 +42,14 @@ def describe_outcome(made: Iterable[str], workplace: str | Path = "") -> list[st
         match = _CAMPAIGN.fullmatch(path)
         if match:
             verdict = read_verdict(Path(workplace, path).with_name("verdict.json"))
-            lines += [*_describe_campaign(match[1], verdict), f"  report: {path}"]
+            lines += [*describe_verdict(match[1], verdict), f"  report: {path}"]
             advice.append(_advise(verdict))
     # With several campaigns, each report has its own advice.
     return lines + advice if len(advice) == 1 else lines
 
 
-def _describe_campaign(name: str, verdict: Verdict) -> list[str]:
-    """Return the verdict on a campaign and its errors."""
+def describe_verdict(name: str, verdict: Verdict) -> list[str]:
+    """Describe the verdict on a campaign of this name, and its errors, in lines."""
     # Import the templates only here, because a run without a report does not need them.
     from elastocal.report.loop_facts import render_campaign_sentences
 

@@ -1,0 +1,198 @@
+"""A robot with its calibrated model: where it goes, and commands that correct it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.application.accuracy import ErrorPrediction, predict_errors
+from elastocal.application.calibrated import CalibratedRobot, predict_poses
+from elastocal.application.exported import fold_effects, write_robot_file
+from elastocal.application.path_correction import CorrectedPath, correct_path
+from elastocal.campaigns.measurements import ROTATION
+from elastocal.errors import InputError
+from elastocal.exchange.target_path import (
+    TargetPath,
+    build_target_path,
+    read_target_path_for,
+)
+from elastocal.exchange.urdf_writing import write_calibrated_origins
+from elastocal.io.atomic_writes import write_atomically
+from elastocal.loop.calibrated_files import decide_by_prediction
+from elastocal.mechanics.components import WRENCH_NAMES
+from elastocal.validation.conformity import Conformity, list_shortfalls
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from numpy.typing import ArrayLike
+
+    from elastocal.mechanics.robot import Robot
+    from elastocal.verdict import Verdict
+
+
+@dataclass(frozen=True, eq=False)
+class CorrectedRobot:
+    """A robot with the model that a campaign has identified.
+
+    Attributes
+    ----------
+    calibrated : CalibratedRobot
+        The model with its uncertainty.
+    verdict : Verdict
+        The verdict on the campaign.
+    """
+
+    calibrated: CalibratedRobot = field(repr=False)
+    verdict: Verdict = field(repr=False)
+
+    @property
+    def nominal(self) -> Robot:
+        """The robot as it was declared."""
+        return self.calibrated.robot
+
+    def predict(
+        self, joint_angles: ArrayLike, wrenches: ArrayLike | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Predict where the robot comes to rest.
+
+        Parameters
+        ----------
+        joint_angles : (N, n) array
+            Commands as the controller reports them, rad; of prismatic joints m.
+        wrenches : (N, 6) array, optional
+            Loads at the last measuring point, base axes, N and N m.
+
+        Returns
+        -------
+        positions, rotations : (N, 3) array, m, and (N, 3, 3) array
+            Pose of the last measuring point in the base frame.
+        """
+        angles, loads = self._check_commands(joint_angles, wrenches)
+        return predict_poses(self.calibrated, angles, loads)
+
+    def predict_errors(
+        self, joint_angles: ArrayLike, wrenches: ArrayLike | None = None
+    ) -> ErrorPrediction:
+        """Predict the errors that remain at corrected commands; arguments as of
+        `predict`."""
+        return predict_errors(
+            self.calibrated, *self._check_commands(joint_angles, wrenches)
+        )
+
+    def correct(
+        self,
+        path: str | Path | pd.DataFrame,
+        *,
+        allow_large_steps: bool = False,
+        partial: bool = False,
+    ) -> CorrectedPath:
+        """Compute the commands that reach wanted poses.
+
+        Parameters
+        ----------
+        path : str, path or DataFrame
+            Wanted poses of the last measuring point, base frame: ``x, y, z`` in m and
+            ``rx, ry, rz`` in rad; optionally ``fx..mz``, their loads, and ``q1..qn``,
+            the posture.
+        allow_large_steps : bool
+            Whether joints may turn much farther than the path does.
+        partial : bool
+            Whether poses that cannot be corrected are left out.
+
+        Returns
+        -------
+        CorrectedPath
+            Its `table` has the joint targets with their predicted errors and bounds.
+
+        Raises
+        ------
+        InputError
+            Names the line, what was found and what is allowed.
+        """
+        source = "path"
+        if isinstance(path, (str, Path)):
+            wanted = read_target_path_for(path, self.nominal)
+            source = str(path)
+        else:
+            wanted = _arrange_path(path, self.nominal.joints)
+        return correct_path(
+            self.calibrated,
+            wanted,
+            source,
+            allow_large_steps=allow_large_steps,
+            partial=partial,
+        )
+
+    def certify(self, tolerance_m: float, accepted_risk: float = 0.05) -> Conformity:
+        """Decide whether the corrected robot keeps a tolerance, as predicted.
+
+        Parameters
+        ----------
+        tolerance_m : float
+            Largest allowed RMS position error over the poses of the campaign, m.
+        accepted_risk : float
+            Accepted probability of a wrong decision.
+        """
+        states = self.calibrated.states
+        commands = self.nominal.reported_angles(states.joint_angles)
+        prediction = predict_errors(self.calibrated, commands, states.wrench)
+        configurations = self.verdict.heldout.configurations
+        shortfalls = list_shortfalls(configurations, states, self.nominal)
+        return decide_by_prediction(prediction, shortfalls, tolerance_m, accepted_risk)[
+            0
+        ]
+
+    def to_robot_file(self, path: str | Path) -> tuple[str, ...]:
+        """Write geometry, springs and weights as a robot file; return the names of the
+        effects that no robot file can hold."""
+        folded = fold_effects(self.calibrated)
+        write_robot_file(path, folded, self.verdict.campaign)
+        effects = self.calibrated.model.effects
+        return tuple(effects[number].key for number in folded.left_out)
+
+    def to_urdf(self, path: str | Path, original: str | Path) -> int:
+        """Write the URDF `original` with calibrated joint origins; return how many were
+        changed. A URDF holds the geometry alone."""
+        folded = fold_effects(self.calibrated)
+        corrected = write_calibrated_origins(original, self.nominal, folded.robot)
+        with write_atomically(path) as partial:
+            Path(partial).write_bytes(corrected.content)
+        return corrected.changed
+
+    def _check_commands(
+        self, joint_angles: ArrayLike, wrenches: ArrayLike | None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Check the shapes of commands and loads."""
+        angles = np.asarray(joint_angles, float)
+        joints = self.nominal.joints
+        if angles.ndim != 2 or angles.shape[1] != joints:
+            finding = f"an array of shape {angles.shape}"
+            allowed = f"an array of shape (N, {joints})"
+            raise InputError("CorrectedRobot", "joint_angles", finding, allowed)
+        loads = np.zeros((len(angles), 6))
+        if wrenches is not None:
+            loads = np.asarray(wrenches, float)
+        if loads.shape != (len(angles), 6):
+            finding = f"an array of shape {loads.shape}"
+            allowed = f"an array of shape ({len(angles)}, 6)"
+            raise InputError("CorrectedRobot", "wrenches", finding, allowed)
+        return angles, loads
+
+
+def _arrange_path(table: pd.DataFrame, joints: int) -> TargetPath:
+    """Arrange a table of wanted poses."""
+    pose = [*"xyz", *ROTATION]
+    angles = [f"q{joint}" for joint in range(1, joints + 1)]
+    missing = next((name for name in pose if name not in table), None)
+    if missing is not None:
+        allowed = f"a table with {', '.join(pose)}"
+        raise InputError("path", "", f"no column {missing!r}", allowed)
+    wrench = None
+    if WRENCH_NAMES[0] in table:
+        loads = table.reindex(columns=[*WRENCH_NAMES], fill_value=0.0)
+        wrench = loads.to_numpy(float)
+    start = table[angles].to_numpy(float) if angles[0] in table else None
+    return build_target_path(table[pose].to_numpy(float), start, wrench)

@@ -1,0 +1,185 @@
+"""Before and after a campaign: plan it, simulate it, check it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elastocal.application.inverse_kinematics import compute_reach_m
+from elastocal.application.planning.cell import COLUMN_SHARE, RADIUS_SHARE, Cell
+from elastocal.application.planning.plan import choose_plan, find_allowed_candidates
+from elastocal.application.planning.survey import SENSORS, Survey
+from elastocal.campaigns.campaign import OFFSET_STD_M, Target
+from elastocal.campaigns.simulation import Plan as SimulatedPlan
+from elastocal.campaigns.simulation import draw_measurements
+from elastocal.interface.campaigns import Campaign
+from elastocal.loop.overview import Overview, inspect_case
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import pandas as pd
+
+    from elastocal.application.planning.plan import Plan
+    from elastocal.mechanics.robot import Robot
+
+# Number of random configurations from which a plan chooses, as of `elastocal plan`.
+_CANDIDATES = 10_000
+
+
+@dataclass(frozen=True, eq=False)
+class MeasurementPlan:
+    """Where to measure a robot.
+
+    Attributes
+    ----------
+    chosen : Plan
+        Configurations to fit and to validate, and the accuracy that they give.
+    survey : Survey
+        What is measured in each configuration, and how accurately.
+    """
+
+    chosen: Plan = field(repr=False)
+    survey: Survey = field(repr=False)
+
+    @property
+    def joint_angles(self) -> np.ndarray:
+        """(N, n) configurations to fit, rad, as the controller reports them."""
+        return self.chosen.fitted.joint_angles
+
+    @property
+    def held_out_angles(self) -> np.ndarray:
+        """(H, n) random configurations that judge the result."""
+        return self.chosen.held_out.joint_angles
+
+    @property
+    def predicted_error_m(self) -> float:
+        """RMS position error that the parameters of a fit to these configurations leave,
+        m, without the tracker's noise."""
+        return float(self.chosen.accuracy_m[-1])
+
+
+def plan(
+    robot: Robot,
+    *,
+    poses: int = 20,
+    held_out: int = 9,
+    force_N: float = 0.0,
+    targets: Mapping[str, tuple[float, float, float] | None] | None = None,
+    seed: int = 1,
+) -> MeasurementPlan:
+    """Choose where to measure: configurations that determine the parameters best.
+
+    Parameters
+    ----------
+    robot : Robot
+        The nominal robot; its limits and the floor are kept.
+    poses, held_out : int
+        Numbers of poses to fit and of random ones that judge the result.
+    force_N : float
+        Weight of a load that hangs from the robot; 0 for none.
+    targets : mapping, optional
+        Offset of each target at the last measuring point, m; None where it is unknown.
+        By default there is one target at an unknown offset.
+    seed : int
+        Seed of the random configurations.
+
+    Raises
+    ------
+    InputError
+        Names the argument, what was found and what is allowed.
+    """
+    sensor = SENSORS["position"]
+    end = robot.chain.end_effector.name
+    tracked = tuple(
+        Target(name, end, offset_m, offset_std_m=OFFSET_STD_M)
+        for name, offset_m in (targets or {"target": None}).items()
+    )
+    survey = Survey(
+        robot,
+        tracked,
+        unknown_base=True,
+        measured="position",
+        position_m=sensor.position_m,
+        orientation_rad=sensor.orientation_rad,
+        force_N=force_N,
+    )
+    reach_m = compute_reach_m(robot)
+    cell = Cell(
+        boxes=(),
+        tracker_m=None,
+        radius_m=RADIUS_SHARE * reach_m,
+        floor_m=0.0,
+        column_m=COLUMN_SHARE * reach_m,
+    )
+    candidates = find_allowed_candidates(survey, cell, _CANDIDATES, seed)
+    return MeasurementPlan(
+        choose_plan(survey, candidates, poses, held_out, seed), survey
+    )
+
+
+def simulate(
+    robot: Robot,
+    *,
+    poses: int = 40,
+    force_N: float = 0.0,
+    noise_m: float = 1e-5,
+    repeats: int = 5,
+    seed: int = 1,
+) -> pd.DataFrame:
+    """Measure a simulated robot at random poses.
+
+    Its joints are elastic as the robot states and otherwise exact: a robot that lacks
+    nothing. Change the robot to simulate one that does.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot that is measured.
+    poses : int
+        Number of random poses within the joint limits.
+    force_N : float
+        Force at the last measuring point, in a random direction at each pose.
+    noise_m : float
+        Standard deviation of each coordinate.
+    repeats : int
+        How often each of the first five poses is measured.
+    seed : int
+        Seed of the random numbers.
+
+    Returns
+    -------
+    DataFrame
+        Columns of measurements.csv, see `Campaign.from_table`.
+    """
+    import pandas as pd
+
+    measured = SimulatedPlan(
+        points=(robot.chain.end_effector.name,),
+        poses=poses,
+        force_N=force_N,
+        ladder=(0.0, 1.0) if force_N else (0.0,),
+        offset_m=(0.0, 0.0, 0.0),
+        repeats=repeats,
+        repeated_poses=min(5, poses),
+        noise_m=noise_m,
+        noise_rad=0.0,
+    )
+    columns: dict[str, Any] = draw_measurements(robot, measured, seed, "simulate")
+    table = pd.DataFrame(columns).drop(columns=["rx", "ry", "rz"])
+    # A campaign of one target names it itself.
+    return table.drop(columns="target")
+
+
+def check(campaign: Campaign) -> Overview:
+    """Say what a campaign identifies and what looks suspicious, before a diagnosis.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        The measurements.
+    """
+    fitted, held_out = campaign.split()
+    return inspect_case(fitted, held_out.campaign.measurements)

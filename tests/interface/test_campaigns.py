@@ -1,0 +1,88 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_folders import make_folder
+
+import elastocal as ec
+
+TOP = Path(__file__).resolve().parents[2]
+
+
+def angles_and_positions(measured, nominal):
+    angles = measured[[f"q{joint}" for joint in range(1, nominal.joints + 1)]]
+    return angles.to_numpy(), measured[[*"xyz"]].to_numpy()
+
+
+def test_arrays_and_table_make_the_same_campaign(nominal, measured):
+    angles, positions = angles_and_positions(measured, nominal)
+    columns = {name: measured[name] for name in ("pose", "load", "repeat")}
+    wrenches = measured[["fx", "fy", "fz", "mx", "my", "mz"]]
+    arrays = ec.Campaign(
+        nominal,
+        joint_angles=angles,
+        positions=positions,
+        wrenches=wrenches,
+        columns=columns,
+    )
+    table = ec.Campaign.from_table(nominal, measured)
+    for name, values in vars(arrays.checked.measurements).items():
+        np.testing.assert_array_equal(values, getattr(table.checked.measurements, name))
+
+
+def test_poses_and_repeats_are_counted_where_no_column_numbers_them(nominal, measured):
+    angles, positions = angles_and_positions(measured, nominal)
+    campaign = ec.Campaign(nominal, joint_angles=angles, positions=positions)
+    counted = campaign.checked.measurements
+    assert len(np.unique(counted.pose)) == measured["pose"].nunique()
+    assert counted.repeat.max() == measured["repeat"].max()
+
+
+def test_several_targets_make_a_row_each_but_for_missing_ones(nominal, measured):
+    angles, positions = angles_and_positions(measured, nominal)
+    two = np.stack([positions, positions + 0.05], axis=1)
+    two[7, 1] = np.nan
+    targets = {
+        name: {"point": "tool", "offset_m": "unknown"} for name in ("left", "right")
+    }
+    campaign = ec.Campaign(nominal, joint_angles=angles, positions=two, targets=targets)
+    assert len(campaign) == 2 * len(angles) - 1
+
+
+def test_folder_is_read_with_a_robot_of_the_project(tmp_path, kuka):
+    folder = make_folder(tmp_path, kuka)
+    campaign = ec.read_campaign(folder, TOP / "config/robots")
+    fitted, held_out = campaign.split()
+    rows = [len(case.campaign.measurements) for case in (fitted, held_out)]
+    assert sum(rows) == len(campaign)
+    assert min(rows) > 0
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"joint_angles": np.zeros((40, 5))}, "joint_angles: found an array of shape"),
+        ({"positions": np.zeros((3, 3))}, "positions: found an array of shape (3, 3)"),
+        ({"wrenches": "heavy"}, "wrenches"),
+        ({"frame": "moon"}, "frame"),
+        ({"declared": ["magic"]}, "declared[0]: found 'magic'"),
+        ({"columns": {"colour": np.zeros(60)}}, "columns: found 'colour'"),
+        ({"no_such_key": 1}, "no_such_key"),
+    ],
+)
+def test_a_wrong_argument_is_named_in_one_line(nominal, measured, change, message):
+    angles, positions = angles_and_positions(measured, nominal)
+    arguments = {"joint_angles": angles, "positions": positions}
+    if "columns" in change:
+        change = {"columns": {"colour": np.zeros(len(angles))}}
+    with pytest.raises(ec.InputError) as caught:
+        ec.Campaign(nominal, **(arguments | change))
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_wrong_value_is_named_by_argument_and_row(nominal, measured):
+    angles, positions = angles_and_positions(measured, nominal)
+    angles[4, 2] = np.inf
+    with pytest.raises(ec.InputError, match=r"row 5, column joint_angles\[2\]"):
+        ec.Campaign(nominal, joint_angles=angles, positions=positions)

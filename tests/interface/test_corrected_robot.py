@@ -1,0 +1,96 @@
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.spatial.transform import Rotation
+
+import elastocal as ec
+from elastocal.mechanics.kinematics import compute_poses
+
+ROTATION = ["rx", "ry", "rz"]
+
+
+@pytest.fixture
+def commands(nominal):
+    return np.random.default_rng(2).uniform(-1.0, 1.0, (6, nominal.joints))
+
+
+def wanted_poses(nominal, commands):
+    """Poses that the nominal robot reaches at commands, and these as postures."""
+    position, rotation = compute_poses(
+        nominal.chain, commands, nominal.chain.end_effector
+    )
+    vectors = Rotation.from_matrix(rotation).as_rotvec()
+    names = [*"xyz", *ROTATION, *(f"q{j}" for j in range(1, nominal.joints + 1))]
+    return pd.DataFrame(np.column_stack([position, vectors, commands]), columns=names)
+
+
+def test_corrected_commands_reach_the_wanted_poses(result, nominal, commands):
+    table = wanted_poses(nominal, commands)
+    corrected = result.robot.correct(table)
+    angles = corrected.table[[f"q{j}" for j in range(1, nominal.joints + 1)]]
+    position, _ = result.robot.predict(angles.to_numpy())
+    np.testing.assert_allclose(position, table[[*"xyz"]], atol=1e-9)
+
+
+def test_commands_move_by_the_wrong_zero(result, nominal, commands):
+    corrected = result.robot.correct(wanted_poses(nominal, commands))
+    shift = corrected.correction.joint_angles - commands
+    np.testing.assert_allclose(shift[:, 1], -2e-3, atol=3e-4)
+
+
+def test_a_file_gives_the_same_commands_as_a_table(result, nominal, commands, tmp_path):
+    table = wanted_poses(nominal, commands)
+    path = tmp_path / "path.csv"
+    table.to_csv(path, index=False)
+    pd.testing.assert_frame_equal(
+        result.robot.correct(path).table, result.robot.correct(table).table
+    )
+
+
+def test_predicted_error_covers_the_true_one(result, nominal, commands):
+    """The faulty robot's second joint is off by 2 mrad."""
+    prediction = result.robot.predict_errors(commands)
+    true_angles = commands + np.eye(nominal.joints)[1] * 2e-3
+    true_position, _ = compute_poses(
+        nominal.chain, true_angles, nominal.chain.end_effector
+    )
+    position, _ = result.robot.predict(commands)
+    distance = np.linalg.norm(position - true_position, axis=1)
+    assert (distance <= prediction.bound_m).all()
+
+
+def test_certificate_passes_a_wide_tolerance_and_fails_a_narrow_one(result):
+    assert result.robot.certify(1e-3).decision == "pass"
+    assert result.robot.certify(1e-7).decision == "fail"
+
+
+def test_robot_file_holds_the_wrong_zero(result, nominal, commands, tmp_path):
+    path = tmp_path / "arm.yaml"
+    assert result.robot.to_robot_file(path) == ()
+    exported = ec.read_robot(path)
+    position, _ = compute_poses(
+        exported.chain, exported.model_angles(commands), exported.chain.end_effector
+    )
+    np.testing.assert_allclose(position, result.robot.predict(commands)[0], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        (pd.DataFrame({"x": [0.0]}), "no column 'y'"),
+        (
+            pd.DataFrame(np.full((1, 6), np.nan), columns=[*"xyz", *ROTATION]),
+            "row 1, column x",
+        ),
+    ],
+)
+def test_a_wrong_path_is_refused_in_one_line(result, table, message):
+    with pytest.raises(ec.InputError, match=message):
+        result.robot.correct(table)
+
+
+def test_commands_of_another_number_of_joints_are_refused(result):
+    with pytest.raises(ec.InputError, match="joint_angles"):
+        result.robot.predict(np.zeros((2, 5)))
+    with pytest.raises(ec.InputError, match="wrenches"):
+        result.robot.predict(np.zeros((2, 6)), np.zeros((3, 6)))
