@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_campaigns import Plan, make_campaign
 
-from elastocal.campaigns.campaign import Target
+from elastocal.campaigns.campaign import Target, join_measurements
 from elastocal.data_checks.target_distances import compare_target_distances
 
 NOISE_M = 5e-5
@@ -52,6 +52,27 @@ def test_a_wrong_distance_is_said_in_one_line_with_the_cure(
     assert sentence.startswith("R1 and R2 are 0.5")
     assert words.partition(" mm ")[2] in sentence
     assert "measure the tool with the tracker" in sentence
+
+
+def test_of_several_wrong_distances_the_largest_is_named(campaign):
+    measured = campaign.measurements
+    first = measured.select(measured.target == 0)
+    third = replace(
+        first,
+        target=np.full(len(first), 2),
+        position=np.add(first.position, [0, 0, 0.03]),
+    )
+    joined = join_measurements(measured, third)
+    targets = (
+        *declare(campaign, 0.12053).targets,
+        # 1.2 mm from where the third reflector is.
+        Target("R3", "6DoF", (0.05, 0.0, 0.0312)),
+    )
+    (sentence,) = compare_target_distances(
+        replace(campaign, targets=targets, measurements=joined)
+    )
+    assert sentence.startswith("R1 and R3 are 1.20 mm")
+    assert "further pair" in sentence
 
 
 def test_chance_is_no_wrong_distance(campaign):

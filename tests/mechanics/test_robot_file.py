@@ -197,7 +197,15 @@ def test_faulty_robot_file_is_refused_in_one_line(changes, key, words):
 
 @pytest.mark.parametrize(
     "changes",
-    [{}, WEIGHED, TRACKED, REPORTED],
+    [
+        {},
+        WEIGHED,
+        TRACKED,
+        REPORTED,
+        # An offset alone, and a matrix alone.
+        {"reported_joints": {"offset_deg": [90, -45]}},
+        {"reported_joints": {"matrix": [[1, 0], [1, -1]]}},
+    ],
 )
 def test_a_described_robot_parses_to_the_same_robot(changes):
     robot = parse_robot(document(**changes))

@@ -6,6 +6,7 @@ import pytest
 from support import ODD_CHAINS, OTHER_CHAINS, TRACK, random_angles, robot_of, robot_on
 
 from elastocal.mechanics.kinematics import compute_poses, compute_poses_and_jacobians
+from elastocal.mechanics.robot_file import parse_robot
 from elastocal.mechanics.sites import build_sites
 
 NAMES = ["kuka", "fanuc", *OTHER_CHAINS]
@@ -122,3 +123,24 @@ def test_sites_of_a_robot_on_a_track():
     np.testing.assert_allclose(
         sites.link_vectors_m[:3], [(0, 0, 0.3), (0, 0, 0.5), (0.3, 0, 0)], atol=1e-16
     )
+
+
+def test_weight_acts_on_a_joint_at_the_longest_lever_of_the_middle_of_its_link():
+    """Two links of 0.3 and 0.2 m with 4 and 2 kg, stretched out before the joints."""
+    robot = parse_robot(
+        {
+            "name": "planar arm",
+            "chain": "Ry(q1) Tx(0.3) Ry(q2) Tx(0.2) [tool]",
+            "masses": [
+                {"link": 1, "mass_kg": 4, "centre_m": [0, 0, 0], "relative_std": 0.1},
+                {"link": 2, "mass_kg": 2, "centre_m": [0, 0, 0], "relative_std": 0.1},
+            ],
+        }
+    )
+    sites = build_sites(robot)
+    gravity = np.linalg.norm(robot.gravity_m_s2)
+    stretched_out = gravity * np.array([4 * 0.15 + 2 * 0.4, 2 * 0.1])
+    torques = [sites.longest_weight_torque_Nm(joint) for joint in (0, 1)]
+    # The levers are those of sampled postures, the longest of which are nearly stretched.
+    assert (torques <= stretched_out).all()
+    assert (torques > 0.9 * stretched_out).all()
