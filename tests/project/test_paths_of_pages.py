@@ -79,7 +79,8 @@ def test_a_function_that_is_named_with_a_module_is_in_that_module():
 
 MAX_LINES = 120
 MAX_WORDS = 1000
-FIRST_SCREEN_LINES = 25
+# The claim, a picture, two tables, four commands and five lines of Python.
+FIRST_SCREEN_LINES = 32
 
 
 def test_the_readme_is_short():
@@ -87,17 +88,19 @@ def test_the_readme_is_short():
     assert len(README.split()) <= MAX_WORDS
 
 
-def test_the_first_screen_has_the_claim_a_picture_the_figures_and_four_commands():
+def test_the_first_screen_has_the_claim_a_picture_the_figures_and_the_two_ways_in():
     first = README.partition("\n## ")[0].splitlines()
     assert len(first) <= FIRST_SCREEN_LINES
     assert sum("![" in line for line in first) == 1
     commands = [line.split("#")[0].strip() for line in first if line.startswith("    ")]
-    assert commands == [
+    assert commands[:4] == [
         "make paper",
         "make test",
         "make study",
         ".venv/bin/elastocal demo",
     ]
+    assert commands[4] == "import elastocal as ec"
+    assert len(commands) == 9
     screen = "\n".join(first)
     for phrase in (
         "uncorrected | corrected | noise floor",
