@@ -1,6 +1,7 @@
 """The error of bad input is one line: where, what was found and what is allowed."""
 
 import errno
+import pickle
 from pathlib import Path
 
 import pytest
@@ -35,6 +36,12 @@ def test_the_message_is_one_line_and_the_error_keeps_its_parts(parts, message):
         str(parts[0]),
         *parts[1:],
     )
+
+
+def test_another_process_gets_the_error_with_its_parts():
+    error = InputError("a.yaml", "key", "x", "y")
+    received = pickle.loads(pickle.dumps(error))
+    assert str(received) == str(error) and vars(received) == vars(error)
 
 
 def test_the_closest_allowed_name_comes_first_regardless_of_its_case():

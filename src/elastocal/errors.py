@@ -59,6 +59,10 @@ class InputError(ValueError):
         message += _shorten(format_printable(allowed), LONGEST_MESSAGE - len(message))
         super().__init__(message)
 
+    def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str, str]]:
+        """Keep the parts in a pickle, with which processes pass on an error."""
+        return InputError, (self.source, self.key, self.found, self.allowed)
+
 
 def suggest_names(name: str, known: Collection[str]) -> str:
     """Return the known names for a message, with the one closest to a wrong name as a

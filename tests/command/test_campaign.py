@@ -10,7 +10,7 @@ from made_folders import make_folder, make_table
 from rich.console import Console
 
 from elastocal.campaigns.campaign_folder import read_campaign_folder
-from elastocal.command import campaign
+from elastocal.command import campaign, diagnosis_runs
 
 ROBOT = "name: arm\nchain: Rz(q1) Tx(1.0) [tip]\n"
 
@@ -126,8 +126,8 @@ def diagnose(elastocal, tmp_path, monkeypatch):
         stand_in = tmp_path / "python"
         stand_in.write_text(f'#!/bin/sh\necho "$PWD" "$@"\nexit {exit_code}\n')
         stand_in.chmod(0o755)
-        monkeypatch.setattr(campaign.sys, "executable", str(stand_in))
-        monkeypatch.setattr(campaign, "find_pipeline", lambda: pipeline)
+        monkeypatch.setattr(diagnosis_runs.sys, "executable", str(stand_in))
+        monkeypatch.setattr(diagnosis_runs, "find_pipeline", lambda: pipeline)
         monkeypatch.setattr(campaign, "find_workplace", lambda: tmp_path)
         return elastocal("diagnose", tmp_path / "cell7", "-j", 1)
 

@@ -3,20 +3,25 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 from typer import Argument, Option
 
+from elastocal.command.diagnosis_runs import (
+    PROFILE_NOTICE,
+    build_run_command,
+    diagnose_folders,
+    format_runs,
+)
 from elastocal.command.terminal import (
     MOST_ROWS,
     ForceOption,
     LengthsOption,
     TargetsOption,
-    find_pipeline,
     find_robots_folder,
     find_workplace,
     print_answer,
@@ -27,16 +32,15 @@ from elastocal.counting import format_count
 from elastocal.errors import InputError, escape_control_characters
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from rich.console import Console
 
 _ROBOT = "robot.yaml"
-# Snakemake prints the second line before its logger begins.
 _NOTHING_TO_DO = "Nothing to be done"
 # Characters of a line that a terminal repeats while the step is at work.
 _LONGEST_STEP = 60
-_PROFILE_NOTICE = "Using workflow specific profile"
+_CORES_OF_ONE_CAMPAIGN = 2
 
 
 def init(
@@ -137,12 +141,22 @@ def check(folder: Annotated[Path, Argument(help="Folder of the campaign.")]) -> 
 
 
 def diagnose(
-    folder: Annotated[Path, Argument(help="Folder of the campaign.")],
+    folders: Annotated[
+        list[Path],
+        Argument(metavar="FOLDER...", help="Folder of the campaign, or several."),
+    ],
     *,
     cores: Annotated[
-        int,
-        Option("--cores", "-j", min=1, max=MOST_ROWS, help="Jobs that run at a time."),
-    ] = 2,
+        int | None,
+        Option(
+            "--cores",
+            "-j",
+            min=1,
+            max=MOST_ROWS,
+            help="Jobs that run at a time: 2 for one campaign. Of several campaigns one"
+            " runs on each core of this machine.",
+        ),
+    ] = None,
     measured: Annotated[
         Path | None,
         Option(
@@ -160,28 +174,23 @@ def diagnose(
     The report compares the error before and after on held-out poses. It is the
     Snakemake target `diagnose` of this campaign. With --with it goes round the loop
     again: the measurements of the corrected robot are joined to the campaign as a
-    further session, in a new folder.
+    further session, in a new folder. Several campaigns run side by side, a process
+    each; one that fails stops no other, and a table of all stands at the end.
     """
     from rich.console import Console
 
-    from elastocal.campaigns.campaign_folder import check_workflow_path
-
     console = Console(stderr=True)
+    folder = folders[0]
+    if len(folders) > 1:
+        _refuse_joining(folders, measured)
+        _diagnose_several(folders, cores, console)
     if measured is not None:
         folder = _join_measurements(
             folder, measured, targets, lengths, console, force=force
         )
-    campaign = str(folder.resolve())
-    check_workflow_path(campaign)
     workplace = find_workplace()
-    snakefile = find_pipeline() / "Snakefile"
-    arguments = ["-m", "snakemake", f"-j{cores}", "diagnose"]
-    arguments += ["--config", f"campaign={campaign}"]
-    # An installed pipeline runs in the working directory.
-    if snakefile.parent != workplace:
-        arguments += ["--snakefile", str(snakefile)]
     with subprocess.Popen(
-        [sys.executable, *arguments],
+        build_run_command(folder, cores or _CORES_OF_ONE_CAMPAIGN, workplace),
         cwd=workplace,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -192,6 +201,27 @@ def diagnose(
     if nothing_to_do and not process.returncode:
         _print_outcome(folder, workplace, console)
     raise typer.Exit(process.returncode)
+
+
+def _refuse_joining(folders: Sequence[Path], measured: Path | None) -> None:
+    """Refuse measurements of a corrected robot for several campaigns."""
+    if measured is not None:
+        found = format_count(len(folders), "campaign")
+        allowed = "one campaign, whose robot was measured"
+        raise InputError("--with", str(measured), found, allowed)
+
+
+def _diagnose_several(
+    folders: Sequence[Path], cores: int | None, console: Console
+) -> NoReturn:
+    """Diagnose campaigns side by side and print a table; the exit code is 1 if one
+    failed."""
+    from rich.console import Console
+
+    processes = min(len(folders), cores or os.cpu_count() or 1)
+    runs = diagnose_folders(folders, processes, console)
+    print_lines(format_runs(runs), Console())
+    raise typer.Exit(int(any(run.fault for run in runs)))
 
 
 def _follow_run(lines: Iterable[str], console: Console) -> bool:
@@ -214,7 +244,7 @@ def _follow_run(lines: Iterable[str], console: Console) -> bool:
         task = progress.add_task("", total=None)
         for line in map(str.rstrip, lines):
             nothing_to_do = nothing_to_do or line.startswith(_NOTHING_TO_DO)
-            if line.startswith(_PROFILE_NOTICE):
+            if line.startswith(PROFILE_NOTICE):
                 continue
             print_lines([line], console)
             step = escape_control_characters(line)[:_LONGEST_STEP]
