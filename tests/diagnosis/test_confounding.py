@@ -9,6 +9,7 @@ from made_problems import make_problem, make_rows, make_term
 from scipy.stats import kstest
 
 from elastocal.diagnosis.confounding import (
+    _Target,
     compute_joint_p_value,
     find_confounded_mechanisms,
 )
@@ -100,3 +101,20 @@ def test_many_parameters_within_their_errors_are_not_significant_together():
     large = make_null_problem(3, sizes=(5.0 * std_error,))
     assert compute_joint_p_value(small, model, "a") > 0.05
     assert compute_joint_p_value(large, model, "a") < 1e-6
+
+
+def test_the_variant_that_reproduces_most_is_compared():
+    """Companions are eliminated once for all variants, as if once for each."""
+    rows = make_rows(candidates=7)
+    terms = (
+        make_term("a", (1,), [0, 1]),
+        make_term("companion", (1,), 2),
+        *(make_term("b", (1,), columns) for columns in ([3, 4], [5], [6, 3])),
+    )
+    problem, _ = make_problem(rows, terms, tau=[0.0])
+    model = ScoredModel((0, 1), 0.0, np.ones(2), 0.0)
+    target = _Target.of_mechanism(problem, model, "a")
+    for index, explained in target.compute_explained_squares([2, 3, 4]).items():
+        system = target.build_system([index])
+        left = system.compute_residual(np.ones_like(system.forced))
+        assert explained == pytest.approx(system.total - left, rel=1e-10)

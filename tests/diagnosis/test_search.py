@@ -10,8 +10,8 @@ from made_problems import make_problem, make_rows, make_term
 
 from elastocal.diagnosis.discrepancy import NEIGHBOURS
 from elastocal.diagnosis.evidence import evaluate_model, log_sum_exp
-from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.search import search_models
+from elastocal.diagnosis.hypotheses import GROSS_ERROR, OTHER
+from elastocal.diagnosis.search import search_from_starts, search_models
 from elastocal.diagnosis.settings import Settings
 
 TAU = [0.0, 0.3, 0.9]
@@ -129,3 +129,22 @@ def test_a_search_finds_a_good_model_that_it_is_told_even_if_no_step_leads_there
     best = search_models(problem, {"a", "b", "c", "gone"}).models[0]
     assert best.term_indices == (0, 1, 2)
     assert best.log_odds > best_untold + 5
+
+
+def test_gross_errors_that_lead_are_added_in_few_steps():
+    rows = make_rows(5, poses=14, candidates=8)
+    candidates = rows.candidates.copy()
+    candidates[:, :6] = 10.0 * np.eye(len(rows.pose))[:, 4:22:3]
+    residual = rows.residual + candidates[:, :6].sum(axis=1)
+    rows = replace(rows, candidates=candidates, residual=residual)
+    terms = tuple(make_term(GROSS_ERROR, ("row", n), n) for n in range(6))
+    terms += (make_term("offset", (1,), 6), make_term("offset", (2,), 7))
+    problem, _ = make_problem(rows, terms, tau=[0.0])
+    search = search_from_starts(problem.initial_search, [()])
+    wrong = tuple(range(6))
+    assert search.find_best_model() == wrong
+    posterior = search.weigh()
+    expected = enumerate_models(problem)
+    assert posterior.probabilities[0] == pytest.approx(expected[wrong], abs=0.01)
+    grown = {len(model) for model in search.extended if set(model) < set(wrong)}
+    assert grown < set(range(len(wrong)))

@@ -168,10 +168,10 @@ class _Target:
     def is_reproduced_by(self, indices: Sequence[int]) -> bool:
         """Whether terms of one mechanism reproduce the displacements within the
         tolerance of laws."""
-        alone = self._build_system([])
+        alone = self.build_system([])
         tolerance = self.problem.settings.law_tolerance**2
         largest = tolerance * alone.compute_residual(alone.forced)
-        system = self._build_system(self._choose_variants(indices))
+        system = self.build_system(self._choose_variants(indices))
         selected = system.forced.copy()
         for _ in self.columns:
             gains = system.compute_gains(selected)
@@ -188,15 +188,50 @@ class _Target:
         variants: dict[object, list[int]] = defaultdict(list)
         for index in indices:
             variants[self.problem.terms[index].slot].append(index)
+        contested = [
+            index for group in variants.values() if len(group) > 1 for index in group
+        ]
+        explained = self.compute_explained_squares(contested)
         return [
-            min(group, key=self._compute_term_residual) for group in variants.values()
+            max(group, key=lambda index: explained.get(index, 0.0))
+            for group in variants.values()
         ]
 
-    def _compute_term_residual(self, index: int) -> float:
-        system = self._build_system([index])
-        return system.compute_residual(np.ones_like(system.forced))
+    def compute_explained_squares(self, indices: Sequence[int]) -> dict[int, float]:
+        """Squares that the companions and each single term explain, by the index of the
+        term; the companions are eliminated once for all terms.
 
-    def _build_system(self, indices: Sequence[int]) -> _RidgeSystem:
+        With coefficients c that solve (G + I) c = p, these are 2 c'p - c'G c =
+        c'p + c'c.
+        """
+        system = self.build_system(indices)
+        count = int(system.forced.sum())
+        cross = system.gram[:count, count:]
+        own_gram = system.gram[count:, count:]
+        own_products = system.products[count:]
+        eliminated = solve_positive_definite(
+            system.gram[:count, :count] + np.eye(count),
+            np.column_stack([cross, system.products[:count]]),
+        )
+        score = own_products - cross.T @ eliminated[:, -1]
+        explained = {}
+        first = 0
+        for index in indices:
+            width = len(self.problem.terms[index].columns)
+            own = slice(first, first + width)
+            first += width
+            shared = cross[:, own].T @ eliminated[:, own]
+            coefficients = solve_positive_definite(
+                own_gram[own, own] - shared + np.eye(width), score[own]
+            )
+            companions = eliminated[:, -1] - eliminated[:, own] @ coefficients
+            explained[index] = float(
+                coefficients @ (own_products[own] + coefficients)
+                + companions @ (system.products[:count] + companions)
+            )
+        return explained
+
+    def build_system(self, indices: Sequence[int]) -> _RidgeSystem:
         """Build the equations by which the companions and further terms reproduce the
         displacements."""
         problem = self.problem

@@ -386,12 +386,12 @@ def _search_with_gross_errors(
         ),
         key=lambda start: search.evaluate(start).log_odds,
     )
-    posterior = search_from_starts(problem, [(), *ranked[-1:]])
-    best = posterior.models[0].term_indices
+    search = search_from_starts(search, [(), *ranked[-1:]])
+    best = search.find_best_model()
     effects = tuple(number for number in best if terms[number].mechanism != GROSS_ERROR)
     if effects and effects != best:
-        posterior = search_from_starts(problem, [best, effects])
-    return _compute_probabilities(problem, posterior, basis)
+        search = search_from_starts(search, [effects])
+    return _compute_probabilities(problem, search.weigh(), basis)
 
 
 def _list_accidents(

@@ -217,20 +217,25 @@ def search_models(
     return search.weigh()
 
 
-def search_from_starts(problem: SearchProblem, starts: Iterable[TermSet]) -> Posterior:
-    """Search the models from several starts, each by itself, and weigh all models met.
+def search_from_starts(search: BeamSearch, starts: Iterable[TermSet]) -> BeamSearch:
+    """Search the models from several starts, each by itself, and return a search that
+    has met all their models beside those that `search` had met.
 
     Single additions and deletions may not lead from one good model to another: between
     many gross errors and the one effect that explains them all, every model is worse
     than both.
     """
-    merged = problem.initial_search.duplicate()
+    merged = search.duplicate()
     for start in starts:
-        search = problem.initial_search.duplicate()
-        search.evaluate(start)
-        search.grow()
-        merged.absorb(search)
-    return merged.weigh()
+        from_start = search.problem.initial_search.duplicate()
+        # The neighbours of a model that another start led to are known.
+        from_start.extended |= merged.extended
+        from_start.evaluate(start)
+        # The declared model has been extended already.
+        from_start.add_gross_errors(start)
+        from_start.grow()
+        merged.absorb(from_start)
+    return merged
 
 
 def select_pose_errors(
@@ -281,6 +286,9 @@ class BeamSearch:
         self._log_weights = np.array(
             [problem.grid.log_weights_of(term) for term in problem.terms]
         ).reshape(-1, len(problem.grid.scales))
+        self._has_gross_errors = any(
+            term.mechanism == GROSS_ERROR for term in problem.terms
+        )
         slots: dict[object, int] = {}
         self._slots = np.array(
             [slots.setdefault(term.slot, len(slots)) for term in problem.terms], int
@@ -309,6 +317,7 @@ class BeamSearch:
                 self.log_odds[model] = log_odds
                 self.scales[model] = search.scales[model]
         self.evaluated |= search.evaluated
+        self.extended |= search.extended
 
     def extend(self, model: TermSet) -> None:
         """Meet a model with each single term added."""
@@ -344,7 +353,7 @@ class BeamSearch:
         by_pose_error : (T, number of terms, S), log evidence with each single term
         by_scale : (number of terms, S), its sum over T
         """
-        if any(term.mechanism == GROSS_ERROR for term in self.problem.terms):
+        if self._has_gross_errors:
             # As long as gross errors are in the data, they look like a pose error.
             return
         best_terms = np.argsort(-log_sum_exp(by_scale, axis=1))[:_TELLING_TERMS]
@@ -498,13 +507,63 @@ class BeamSearch:
                 if model not in self.evaluated:
                     self.evaluate(model)
                 self.extend(model)
+                self.add_gross_errors(model)
             is_rising = max(self.log_odds.values()) - best > _BETTER
             idle_rounds = 0 if is_rising else idle_rounds + 1
+
+    def add_gross_errors(self, model: TermSet) -> None:
+        """Evaluate an extended model with all gross errors together that each gain more
+        than any effect would.
+
+        A growing model would add them one after the other. They are of different
+        measurements, so that they gain about as much together.
+        """
+        if not self._has_gross_errors:
+            return
+        terms = self.problem.terms
+        extensions = {
+            number: larger
+            for number in range(len(terms))
+            if (larger := tuple(sorted((*model, number)))) in self.log_odds
+        }
+        by_effects = [
+            self.log_odds[larger]
+            for number, larger in extensions.items()
+            if terms[number].mechanism != GROSS_ERROR
+        ]
+        least = max([self.log_odds[model], *by_effects]) + _BETTER
+        gross = [
+            number
+            for number, larger in extensions.items()
+            if terms[number].mechanism == GROSS_ERROR and self.log_odds[larger] > least
+        ]
+        if not gross:
+            return
+        # Rows of a pose that is wrong as a whole would be explained twice.
+        best = max(gross, key=lambda number: self.log_odds[extensions[number]])
+        scales = dict(zip(model, self.scales[model], strict=True))
+        for number in gross:
+            if terms[number].location[0] == terms[best].location[0]:
+                larger = extensions[number]
+                scales[number] = self.scales[larger][larger.index(number)]
+        together = tuple(sorted(scales))
+        is_small = len(together) <= self.problem.settings.largest_model
+        if is_small and together not in self.log_odds:
+            self.scales[together] = tuple(scales[number] for number in together)
+            self.evaluate(together)
 
     def _occams_window(self) -> list[TermSet]:
         """Models whose log odds are close enough to the best ones met so far."""
         least = max(self.log_odds.values()) - _OCCAM_WINDOW
         return [model for model, log_odds in self.log_odds.items() if log_odds > least]
+
+    def find_best_model(self) -> TermSet:
+        """Find the most probable model met, evaluated in full."""
+        while True:
+            best = max(self.log_odds, key=self.log_odds.__getitem__)
+            if best in self.evaluated:
+                return best
+            self.evaluate(best)
 
     def weigh(self) -> Posterior:
         """Evaluate the best models in full, and return their probabilities."""
