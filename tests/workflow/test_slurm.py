@@ -16,10 +16,15 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from durations import HUNG_S
+from analysed_robots import analysed
+from made_folders import make_folder
 from study_folder import REPOSITORY, Study
+from supervised import Supervisor
 
 NODES = ("node1", "node2")
+# Within these seconds daemons are up, and a test ends: `make test-slurm` has ten minutes.
+STARTED_S = 60
+ENDED_S = 240
 # Where Slurm's commands look inside of a job, whose environment the plugin clears of
 # Slurm's variables.
 _SYSTEM = Path("/etc/slurm/slurm.conf")
@@ -67,6 +72,8 @@ TARGETS = (
     "results/identified/kuka/0um/6DoF.parquet",
     "results/identified/kuka/200um/6DoF.parquet",
 )
+# Campaigns of an array of jobs.
+ARRAY = ("first", "second")
 # The first attempt holds its memory until Slurm, which looks each second, has killed
 # it; before its time is over, 2 minutes.
 NEEDS_MORE = """
@@ -82,117 +89,103 @@ rule needs_more:
 
 @pytest.fixture(scope="module")
 def cluster():
-    """Start the daemons, yield the environment of their clients, stop the daemons."""
-    with ExitStack() as stack:
-        # Names of sockets must be short, and munge asks for a folder that others can
-        # read and nobody else can write.
-        folder = Path(
-            stack.enter_context(tempfile.TemporaryDirectory(prefix="slurm", dir="/tmp"))
-        )
-        folder.chmod(0o755)
-        with ExitStack() as sockets:
-            bound = [
-                sockets.enter_context(socket.create_server(("127.0.0.1", 0)))
-                for _ in range(1 + len(NODES))
-            ]
-            control_port, *ports = [
-                bound_socket.getsockname()[1] for bound_socket in bound
-            ]
-        machine = {"host": socket.gethostname().partition(".")[0]}
-        text = Path(__file__).with_name("slurm.conf").read_text(encoding="utf-8")
-        text = text.format(
-            port=control_port, folder=folder, ended="ended.txt", **machine
-        )
-        machine["megabytes"] = (
-            os.sysconf("SC_PAGE_SIZE")
-            * os.sysconf("SC_PHYS_PAGES")
-            // 2**20
-            // len(NODES)
-        )
-        text += "".join(
-            _NODE.format(name=name, port=port, **machine)
-            for name, port in zip(NODES, ports, strict=True)
-        )
-        (folder / "slurm.conf").write_text(text, encoding="utf-8")
-        _SYSTEM.parent.mkdir(exist_ok=True)
-        _SYSTEM.symlink_to(folder / "slurm.conf")
-        stack.callback(_SYSTEM.unlink)
-        for name in ("state", *(f"spool-{node}" for node in NODES)):
-            (folder / name).mkdir()
-        (folder / "munge.key").touch(mode=0o400)
-        (folder / "munge.key").write_bytes(os.urandom(128))
+    """Start the daemons, yield the environment of their clients, stop the daemons.
+
+    They end with the tests, however those end.
+    """
+    # Names of sockets must be short, and munge asks for a folder that others can read
+    # and nobody else can write.
+    folder = Path(tempfile.mkdtemp(prefix="slurm", dir="/tmp"))
+    supervisor = Supervisor(_SYSTEM, folder)
+    try:
+        _write_configuration(folder)
         environment = os.environ | {
             "PATH": _PATH,
             "SLURM_CONF": str(folder / "slurm.conf"),
         }
-
-        def start(*command):
-            log = stack.enter_context((folder / f"{command[0]}.log").open("ab"))
-            both = {"stdout": log, "stderr": subprocess.STDOUT}
-            # Of its own session, so that an interrupt of the tests reaches it only
-            # through its end here.
-            process = subprocess.Popen(
-                command, cwd=folder, env=environment, **both, start_new_session=True
-            )
-            stack.callback(process.wait)
-            stack.callback(process.terminate)
-
-        munge = [
-            f"--{name}-file={folder}/munge.{name}"
-            for name in ("key", "pid", "log", "seed")
-        ]
-        start(
-            "munged",
-            "--foreground",
-            "--force",
-            f"--socket={folder}/munge.socket",
-            *munge,
-        )
-        _wait((folder / "munge.socket").exists)
-        start("slurmctld", "-D")
-        for node in NODES:
-            start("slurmd", "-D", "-N", node)
-        states = ["sinfo", "--noheader", "--Node", "--format=%t"]
-        _wait(
-            lambda: (
-                subprocess.run(
-                    states, env=environment, capture_output=True
-                ).stdout.split()
-                == [b"idle"] * len(NODES)
-            )
-        )
+        _start_daemons(supervisor, folder, environment)
         yield environment
-        subprocess.run(["scancel", "--user=root"], env=environment, capture_output=True)
+    finally:
+        supervisor.end()
+
+
+def _write_configuration(folder):
+    """Write slurm.conf, the key of munge and the folders of the daemons."""
+    folder.chmod(0o755)
+    with ExitStack() as sockets:
+        bound = [
+            sockets.enter_context(socket.create_server(("127.0.0.1", 0)))
+            for _ in range(1 + len(NODES))
+        ]
+        control_port, *ports = [bound_socket.getsockname()[1] for bound_socket in bound]
+    machine = {"host": socket.gethostname().partition(".")[0]}
+    text = Path(__file__).with_name("slurm.conf").read_text(encoding="utf-8")
+    text = text.format(port=control_port, folder=folder, ended="ended.txt", **machine)
+    pages = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    machine["megabytes"] = pages // 2**20 // len(NODES)
+    text += "".join(
+        _NODE.format(name=name, port=port, **machine)
+        for name, port in zip(NODES, ports, strict=True)
+    )
+    (folder / "slurm.conf").write_text(text, encoding="utf-8")
+    _SYSTEM.parent.mkdir(exist_ok=True)
+    _SYSTEM.symlink_to(folder / "slurm.conf")
+    for name in ("state", *(f"spool-{node}" for node in NODES)):
+        (folder / name).mkdir()
+    (folder / "munge.key").touch(mode=0o400)
+    (folder / "munge.key").write_bytes(os.urandom(128))
+
+
+def _start_daemons(supervisor, folder, environment):
+    """Start munged, slurmctld and a slurmd for each node, and wait until nodes are idle."""
+    munge = [
+        f"--{name}-file={folder}/munge.{name}" for name in ("key", "pid", "log", "seed")
+    ]
+    munge_socket = f"--socket={folder}/munge.socket"
+    commands = [
+        ["munged", "--foreground", "--force", munge_socket, *munge],
+        ["slurmctld", "-D"],
+        *(["slurmd", "-D", "-N", node] for node in NODES),
+    ]
+    for command in commands:
+        path = shutil.which(command[0], path=_PATH)
+        log = folder / f"{command[0]}.log"
+        supervisor.start([path, *command[1:]], environment, log)
+        _wait((folder / "munge.socket").exists)
+    states = ["sinfo", "--noheader", "--Node", "--format=%t"]
+    _wait(
+        lambda: (
+            subprocess.run(states, env=environment, capture_output=True).stdout.split()
+            == [b"idle"] * len(NODES)
+        )
+    )
 
 
 def _wait(ready):
-    end = time.monotonic() + HUNG_S
+    end = time.monotonic() + STARTED_S
     while not ready():
         assert time.monotonic() < end
         time.sleep(0.1)
 
 
-def on_slurm(folder, environment, *arguments):
-    profile = REPOSITORY / "profiles" / "slurm"
-    called = [
-        sys.executable,
-        "-m",
-        "snakemake",
-        "--profile",
-        str(profile),
-        *ONE_MACHINE,
-        *arguments,
-    ]
+def run_client(command, folder, environment):
+    """Run a command that uses Slurm; it ends with the tests."""
     done = subprocess.run(
-        called,
+        ["setpriv", "--pdeathsig", "KILL", *map(str, command)],
         cwd=folder,
         env=environment,
         capture_output=True,
         text=True,
-        timeout=HUNG_S,
+        timeout=ENDED_S,
     )
-    assert done.returncode == 0, done.stderr[-3000:]
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     return done.stdout + done.stderr
+
+
+def on_slurm(folder, environment, *arguments):
+    profile = REPOSITORY / "profiles" / "slurm"
+    command = [sys.executable, "-m", "snakemake", "--profile", profile, *ONE_MACHINE]
+    return run_client([*command, *arguments], folder, environment)
 
 
 def contents(study):
@@ -234,3 +227,21 @@ def test_a_job_that_slurm_killed_for_its_memory_runs_again_with_more(cluster, tm
     )
     on_slurm(tmp_path, cluster, "made.txt")
     assert (tmp_path / "made.txt").read_text(encoding="utf-8") == "1000\n"
+
+
+def test_an_array_of_jobs_diagnoses_a_campaign_each(cluster, tmp_path):
+    """By the script of docs/cluster.md, with the command that an environment has."""
+    study = Study.of_sources(tmp_path / "study")
+    folders = [
+        make_folder(tmp_path / name, analysed("kuka"), name=name) for name in ARRAY
+    ]
+    (tmp_path / "folders.txt").write_text("".join(f"{folder}\n" for folder in folders))
+    environment = cluster | {
+        "PATH": f"{Path(sys.executable).parent}:{_PATH}",
+        "PYTHONPATH": str(study.folder / "src"),
+    }
+    script = REPOSITORY / "workflow" / "examples" / "diagnose_array.sh"
+    array = ["--wait", f"--array=1-{len(ARRAY)}", script, tmp_path / "folders.txt"]
+    run_client(["sbatch", *array], study.folder, environment)
+    for name in ARRAY:
+        assert (study.folder / "reports/loop" / name / "report.pdf").stat().st_size
