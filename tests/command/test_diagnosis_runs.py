@@ -69,7 +69,7 @@ def test_a_campaign_that_fails_stops_no_other_and_stands_in_the_table(begin, ela
         ["broken", "failed"],
         ["last", verdict.verdict, *errors],
     ]
-    assert reason == "! broken: broken: found a fault"
+    assert reason == "! broken: found a fault"
 
 
 def test_the_exit_code_is_0_if_none_failed(begin, elastocal):

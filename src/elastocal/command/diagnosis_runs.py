@@ -154,8 +154,8 @@ def _run_and_print(
         running.add(process)
         for line in map(str.rstrip, process.stdout or ()):
             if line and not line.startswith(PROFILE_NOTICE):
-                print_lines([f"{name}: {line}"], console)
-                last_line = line
+                last_line = line.removeprefix(f"{name}: ")
+                print_lines([f"{name}: {last_line}"], console)
     running.discard(process)
     if not process.returncode:
         return ""
