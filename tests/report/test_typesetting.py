@@ -1,6 +1,8 @@
 """A document compiles with its data and pictures, and its PDF appears complete or not
 at all."""
 
+import json
+from collections import Counter
 from importlib import resources
 
 import pytest
@@ -89,3 +91,28 @@ def test_a_value_that_has_the_separator_of_cells_fills_one_cell(tmp_path, monkey
         "one": ["A ¦ B"],
         "rows": [["serial", "A ¦ B", "1"]],
     }
+
+
+@pytest.mark.parametrize("rows", [16, 41, 43, 60])
+@pytest.mark.parametrize("offset_mm", [0, 60, 120, 150])
+def test_a_table_that_breaks_leaves_no_fewer_than_three_rows_on_a_page(
+    rows, offset_mm, tmp_path
+):
+    for file in resources.files("elastocal.report").iterdir():
+        if file.name == "sheet.typ":
+            (tmp_path / "sheet.typ").write_bytes(file.read_bytes())
+    (tmp_path / "origin.json").write_text('""', encoding="utf-8")
+    document = tmp_path / "table.typ"
+    document.write_text(
+        f"""#import "sheet.typ": *
+#show: sheet.with("table")
+// Each row says on which page it stands.
+#show regex("row \\\\d+"): it => [#it #context [#metadata(here().page())<page>]]
+#v({offset_mm}mm)
+#records((1fr, 1fr), ("a", "b"), range({rows}).map(i => ("row " + str(i), "1")), [c])
+""",
+        encoding="utf-8",
+    )
+    pages = json.loads(typst.query(document, "<page>", field="value"))
+    assert len(pages) == rows
+    assert min(Counter(pages).values()) >= 3
