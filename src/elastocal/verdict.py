@@ -384,6 +384,8 @@ class GrossError:
         Residual of the position and of the orientation; None without orientations.
     standard_deviations : float
         Size of the residual in standard deviations.
+    probability : float
+        Posterior probability that the measurement is wrong.
     detail : str
         The gross error in a sentence.
     """
@@ -397,6 +399,7 @@ class GrossError:
     distance_m: float
     turn_rad: float | None
     standard_deviations: float
+    probability: float
     detail: str
 
 

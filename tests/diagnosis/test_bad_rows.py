@@ -126,6 +126,7 @@ def test_one_bad_row_keeps_the_verdict_and_is_reported_with_its_line_and_size(
     assert gross_error["pose"] == 8
     assert gross_error["target"] == "S"
     assert gross_error["standard_deviations"] > 5.0
+    assert 0.9 < gross_error["probability"] <= 1.0
     if size_m is not None:
         assert gross_error["distance_m"] == pytest.approx(size_m, abs=5e-4)
     if size_m == 0.1:

@@ -60,6 +60,7 @@ def fitted_subset(robot, deviation=0.0, payload_kg=0.0):
         [],
         fit_model(model, observations, noise),
         observations,
+        np.zeros(len(observations)),
     )
 
 

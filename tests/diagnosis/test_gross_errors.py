@@ -1,12 +1,15 @@
 """Tests of the outlier test: good rows stand out as rarely as the settings say, and
 sentences state what a gross error reads."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from bad_rows import damaged
 from scipy.stats import binom, chi2
 
 from elastocal.diagnosis.gross_errors import (
+    OutlierTest,
     describe_gross_errors,
     describe_standing_out,
     find_gross_errors,
@@ -64,6 +67,22 @@ def test_sentences_state_a_lost_beam_and_a_repeated_position(cases, diagnosis):
     assert "reads 0, 0, 0" in sentences[measurements.row[4]]
     same_point = f"the same point as line {measurements.row[7] + 1} of"
     assert same_point in sentences[measurements.row[8]]
+
+
+def test_a_sentence_states_a_probability_that_is_not_overwhelming(cases):
+    campaign = cases[0].campaign
+    count = len(campaign.measurements)
+    outcome = replace(
+        OutlierTest.none(count, 6),
+        gross=np.arange(count) < 2,
+        probability=np.linspace(1.0, 0.0, count) ** 5,
+    )
+    first, second = describe_gross_errors(outcome, campaign, held_out=False)
+    assert first.probability == 1.0
+    assert "probability" not in first.detail
+    assert second.probability == outcome.probability[1]
+    percent = f"{100 * second.probability:.0f} %"
+    assert f"wrong with a probability of {percent}, left out" in second.detail
 
 
 def test_rows_that_stay_far_from_the_model_are_described_from_two_poses_on(cases):

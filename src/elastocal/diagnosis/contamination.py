@@ -76,11 +76,30 @@ class Contamination:
     group_p_value: float | None = None
 
 
+@dataclass(frozen=True)
+class JudgedRows:
+    """What former tests say of N rows.
+
+    Attributes
+    ----------
+    kept
+        (N,) of bool, rows that are fitted.
+    readmitted
+        (N,) of bool, rows that stay whatever the next test says.
+    probability
+        (N,), that a row is wrong.
+    """
+
+    kept: np.ndarray
+    readmitted: np.ndarray
+    probability: np.ndarray
+
+
 def find_wrong_rows(
     fitted: Fit,
     noise: Noise,
     case: Case,
-    judged: tuple[np.ndarray, np.ndarray],
+    judged: JudgedRows,
     settings: Settings,
 ) -> OutlierTest:
     """Test all rows of a case against a fit, and weigh those that newly stand out.
@@ -94,16 +113,19 @@ def find_wrong_rows(
     case
         The whole case, of N measurements.
     judged
-        Rows that are kept, (N,) of bool, and rows that stay because they were judged
-        already.
+        What former tests say of the rows. If no further row stands out, the
+        probabilities of rows that are left out stay.
     settings
         Settings of the diagnosis.
     """
-    kept, readmitted = judged
+    kept = judged.kept
+    readmitted = judged.readmitted
     measurements = case.campaign.measurements
     outliers = find_gross_errors(fitted, noise, measurements, kept, settings)
     if not (outliers.gross & kept & ~readmitted).any():
-        return replace(outliers, gross=outliers.gross & ~readmitted)
+        probability = np.where(kept, outliers.probability, judged.probability)
+        gross = outliers.gross & ~readmitted
+        return replace(outliers, gross=gross, probability=probability)
     # Rows under extreme loads are judged by a model that was found without them.
     weighable = ~find_extreme_loads(measurements, settings) & ~readmitted
     weighed = weigh_gross_errors(
@@ -424,4 +446,5 @@ def _compute_probabilities(
             if term.mechanism == GROSS_ERROR:
                 shifted |= basis.list_shifted(term)
         probability += weight * shifted
-    return probability
+    # Rounding of the weights must not make more than certain of it.
+    return np.minimum(probability, 1.0)

@@ -19,7 +19,7 @@ from elastocal.diagnosis import model_averaging, refit, verdict
 from elastocal.diagnosis.alarm import run_alarm_test
 from elastocal.diagnosis.candidate_design import build_candidate_design, refine_shapes
 from elastocal.diagnosis.centre_prior import choose_centre_prior
-from elastocal.diagnosis.contamination import find_wrong_rows
+from elastocal.diagnosis.contamination import JudgedRows, find_wrong_rows
 from elastocal.diagnosis.effect_estimates import find_oversized_effects
 from elastocal.diagnosis.fitted_subset import (
     FittedSubset,
@@ -334,7 +334,11 @@ def _search_and_judge_rows(
     readmitted = start.readmitted.copy()
     for number in range(start.number, settings.gross_error_rounds):
         outliers = find_wrong_rows(
-            fitted, subset.noise, case, (subset.kept, readmitted), settings
+            fitted,
+            subset.noise,
+            case,
+            JudgedRows(subset.kept, readmitted, subset.wrong_probability),
+            settings,
         )
         readmitted |= _find_readmitted(outliers, subset.kept)
         remaining = ~outliers.gross | readmitted
@@ -346,13 +350,18 @@ def _search_and_judge_rows(
         sample = sample_for_search(case, case.select(remaining), settings)
         fitted = _refit_from(fitted, sample, fitted.noise, INTERMEDIATE_TOLERANCE)
         outliers = find_wrong_rows(
-            fitted, subset.noise, case, (remaining, readmitted), settings
+            fitted,
+            subset.noise,
+            case,
+            JudgedRows(remaining, readmitted, outliers.probability),
+            settings,
         )
         readmitted |= _find_readmitted(outliers, remaining)
         previous = subset
         subset = fit_subset(case, ~outliers.gross | readmitted, settings, previous)
         if subset is previous:
             break
+        subset = replace(subset, wrong_probability=outliers.probability)
         context.report(
             f"{format_count((~subset.kept).sum(), 'gross error')} in"
             f" {format_count(len(readmitted), 'row')}: once more without"

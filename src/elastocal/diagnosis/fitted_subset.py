@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -57,6 +57,8 @@ class FittedSubset:
         Fit of the declared model to the search sample.
     search_sample
         Observations that a search uses: all, or a sample of a long campaign.
+    wrong_probability
+        (N,), that a measurement is wrong, by the test that left rows out.
     """
 
     case: Case
@@ -65,6 +67,7 @@ class FittedSubset:
     warnings: list[str]
     declared: Fit
     search_sample: Observations
+    wrong_probability: np.ndarray
 
     @property
     def search_tolerance(self) -> float:
@@ -126,7 +129,8 @@ def fit_subset(
     noise, warnings = estimate_noise(subset)
     sample = sample_for_search(case, subset, settings)
     declared = fit_declared_model(subset.model, sample, noise)
-    return FittedSubset(subset, kept, noise, warnings, declared, sample)
+    left_out = (~kept).astype(float)
+    return FittedSubset(subset, kept, noise, warnings, declared, sample, left_out)
 
 
 def sample_for_search(case: Case, subset: Case, settings: Settings) -> Observations:
@@ -173,7 +177,11 @@ def select_initial_subset(case: Case, settings: Settings) -> FittedSubset:
     weighed = weigh_gross_errors(
         subset.declared, subset.noise, case, gross & ~extreme, settings
     )
-    return fit_subset(case, ~(weighed.gross | (gross & extreme)), settings, subset)
+    left_out = weighed.gross | (gross & extreme)
+    return replace(
+        fit_subset(case, ~left_out, settings, subset),
+        wrong_probability=np.where(extreme, left_out, weighed.probability),
+    )
 
 
 def _find_unexplained_rows(

@@ -44,6 +44,8 @@ _SCALE_QUANTILES = (0.5, 0.75)
 _MIN_EXTRAPOLATED = 5
 # Number of poses from which on rows that are far from the model and stay contradict it.
 _MIN_STANDING_OUT = 2
+# Probability of an error from which on it needs no mention.
+_OVERWHELMING = 0.99
 # Number of gross errors with a sentence of their own among the warnings; the table of
 # residuals lists all of them.
 _MAX_WARNINGS = 10
@@ -295,7 +297,8 @@ def describe_gross_errors(
                 distance_m=float(np.linalg.norm(residual[:3])),
                 turn_rad=turn_rad,
                 standard_deviations=float(outcome.distance[index]),
-                detail=_format_gross_error(residual, campaign, index),
+                probability=float(outcome.probability[index]),
+                detail=_format_gross_error(outcome, campaign, index),
             )
         )
     return gross_errors
@@ -337,10 +340,12 @@ def format_gross_error_warnings(gross_errors: list[GrossError]) -> list[str]:
     return sentences
 
 
-def _format_gross_error(residual: np.ndarray, campaign: Campaign, index: int) -> str:
-    """A sentence with the line of a row in its file, the size of its residual, and the
-    cause if it shows."""
+def _format_gross_error(outcome: OutlierTest, campaign: Campaign, index: int) -> str:
+    """A sentence with the line of a row in its file, the size of its residual, the
+    cause if it shows, and how probable it is that the row is wrong, if that is less
+    than overwhelming."""
     measurements = campaign.measurements
+    residual = outcome.residual[index]
     line = campaign.locate_row(int(measurements.row[index]))
     distance_mm = 1e3 * float(np.linalg.norm(residual[:3]))
     size = f"{distance_mm:.3g} mm"
@@ -357,4 +362,8 @@ def _format_gross_error(residual: np.ndarray, campaign: Campaign, index: int) ->
     elif same_position.any():
         first = int(measurements.row[np.argmax(same_position)])
         cause = f", the same point as {campaign.locate_row(first)}"
-    return f"{line}: {size} off{cause}, left out"
+    probability = outcome.probability[index]
+    doubt = ""
+    if probability < _OVERWHELMING:
+        doubt = f", wrong with a probability of {100 * probability:.0f} %"
+    return f"{line}: {size} off{cause}{doubt}, left out"

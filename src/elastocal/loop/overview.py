@@ -177,9 +177,10 @@ def _describe_gross_errors(
         subset.kept,
         settings,
     )
-    gross_errors = describe_gross_errors(
-        replace(outliers, gross=~subset.kept), whole.campaign, held_out=False
+    left_out = replace(
+        outliers, gross=~subset.kept, probability=subset.wrong_probability
     )
+    gross_errors = describe_gross_errors(left_out, whole.campaign, held_out=False)
     return format_gross_error_warnings(gross_errors)
 
 
