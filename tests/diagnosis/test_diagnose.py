@@ -8,8 +8,8 @@ import pytest
 from made_folders import PLAN, make_folder, make_table
 
 from elastocal.data_checks.protocol import Fault
+from elastocal.diagnosis import adoption, model_averaging
 from elastocal.diagnosis import diagnose as diagnose_module
-from elastocal.diagnosis import model_averaging
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.next_experiment import propose_experiment
@@ -164,20 +164,19 @@ def test_frames_alone_are_kept_if_they_predict_left_out_poses_better(
     assert not any("left out in turn" in w for w in usual.document["warnings"])
     # The standard error of the difference of the squares is 0.2. Let the declared model
     # lose by less than that, then by more.
-    deviations = np.linspace(-1.0, 1.0, 25)
-    deviations /= deviations.std(ddof=1)
     for excess in (0.15, 0.25):
-        frames_squares = np.full(25, 3.0)
-        model_squares = 3.0 + deviations + excess
 
-        def predict_squares(
-            fitted, _, frames_squares=frames_squares, model_squares=model_squares
-        ):
-            return model_squares if fitted.model.effects else frames_squares
+        def predict_residuals(fitted, _, group, excess=excess):
+            squares = np.full(group.max() + 1, 3.0)
+            if fitted.model.effects:
+                deviations = np.linspace(-1.0, 1.0, len(squares))
+                deviations *= 0.2 * np.sqrt(len(squares)) / deviations.std(ddof=1)
+                squares += deviations + excess
+            return np.outer(np.sqrt(squares[group]), [1.0, 0.0, 0.0])
 
-        monkeypatch.setattr(
-            diagnose_module, "predict_left_out_squares", predict_squares
-        )
+        monkeypatch.setattr(adoption, "predict_left_out_residuals", predict_residuals)
+        # Whether effects are adopted is another question.
+        monkeypatch.setattr(adoption, "describe_missing_gain", lambda *_: [])
         diagnosis = diagnose(case, settings, 1)
         assert (diagnosis.document["kept"] == "frames") == (excess > 0.2)
     assert diagnosis.steps[-1].kind == "kept"

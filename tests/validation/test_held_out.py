@@ -33,7 +33,7 @@ from elastocal.validation.held_out import (
     compute_noise_floor,
     compute_position_errors,
     compute_position_residuals,
-    predict_left_out_squares,
+    predict_left_out_residuals,
     refit_without_folds,
     summarize_errors,
     summarize_errors_by_range,
@@ -262,7 +262,8 @@ def average_by_pose(values, cluster):
     return np.bincount(cluster, values) / np.bincount(cluster)
 
 
-def test_predicted_squares_of_left_out_poses_are_those_of_refits(kuka):
+@pytest.mark.parametrize("poses_a_group", [1, 2])
+def test_predicted_squares_of_left_out_poses_are_those_of_refits(poses_a_group, kuka):
     keys = [f"joint_offset@{joint}" for joint in (2, 3, 4, 5)]
     campaign = planted(
         kuka, {key: [5e-4] for key in keys}, seed=3, poses=8, fitted_frames=True
@@ -275,34 +276,33 @@ def test_predicted_squares_of_left_out_poses_are_those_of_refits(kuka):
         0.3,
     )
     fit = fit_model(model, observations, campaign.declared.noise)
-    predicted = predict_left_out_squares(fit, observations)
-    pose = index_poses(observations.states)
+    group = index_poses(observations.states) // poses_a_group
+    cluster = observations.cluster // poses_a_group
+    residual = predict_left_out_residuals(fit, observations, cluster)
+    predicted = average_by_pose((residual[:, :3] ** 2).sum(axis=1), cluster)
     refitted = []
-    for number in range(pose.max() + 1):
-        fitted_poses = select_states(observations, pose != number)
-        left_out_pose = select_states(observations, pose == number)
-        refit = fit_model(model, fitted_poses, fit.noise, fit.estimate)
-        residual = compute_position_residuals(model, refit.estimate, left_out_pose)
-        refitted.append((residual**2).sum(axis=1).mean())
+    for number in range(group.max() + 1):
+        left_out_pose = select_states(observations, group == number)
+        others = select_states(observations, group != number)
+        estimate = fit_model(model, others, fit.noise, fit.estimate).estimate
+        exact = compute_position_residuals(model, estimate, left_out_pose)
+        refitted.append((exact**2).sum(axis=1).mean())
     np.testing.assert_allclose(np.sqrt(predicted), np.sqrt(refitted), rtol=0.1)
-    squares = (fit.residual[:, :3] ** 2).sum(axis=1)
-    fitted_squares = average_by_pose(squares, observations.cluster)
-    assert np.mean(predicted) > 1.2 * np.mean(fitted_squares)
+    fitted = average_by_pose((fit.residual[:, :3] ** 2).sum(axis=1), cluster)
+    assert np.mean(predicted) > 1.2 * np.mean(fitted)
 
 
-def test_predicted_squares_are_those_of_the_residual_if_nothing_is_fitted(kuka):
+def test_left_out_residuals_are_those_of_the_fit_if_nothing_is_fitted(kuka):
     campaign = planted(kuka, {}, seed=5, poses=6)
+    observations = campaign.observations
     fit = fit_model(
         replace(campaign.declared.model, effects=()),
-        campaign.observations,
+        observations,
         campaign.declared.noise,
     )
     assert fit.unidentifiable.size == 0
-    squares = (fit.residual[:, :3] ** 2).sum(axis=1)
-    np.testing.assert_allclose(
-        predict_left_out_squares(fit, campaign.observations),
-        average_by_pose(squares, campaign.observations.cluster),
-    )
+    residual = predict_left_out_residuals(fit, observations, observations.cluster)
+    np.testing.assert_allclose(residual, fit.residual)
 
 
 def fit_loaded_poses(robot, is_loaded, poses=24):

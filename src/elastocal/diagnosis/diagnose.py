@@ -15,7 +15,7 @@ import numpy as np
 from elastocal.counting import format_count
 from elastocal.data_checks.faults import find_faults
 from elastocal.data_checks.target_distances import compare_target_distances
-from elastocal.diagnosis import model_averaging, refit, verdict
+from elastocal.diagnosis import adoption, model_averaging, refit, verdict
 from elastocal.diagnosis.alarm import run_alarm_test
 from elastocal.diagnosis.candidate_design import build_candidate_design, refine_shapes
 from elastocal.diagnosis.centre_prior import choose_centre_prior
@@ -47,12 +47,11 @@ from elastocal.fitting.model import (
     build_nominal_model,
     get_parameter_values,
 )
-from elastocal.fitting.noise import count_effective_parameters, serialize_noise
+from elastocal.fitting.noise import serialize_noise
 from elastocal.fitting.observations import Observations
 from elastocal.io.typed_json import to_document
 from elastocal.random_streams import open_stream
 from elastocal.residual_model.repeatable import detect_repeatable_residual
-from elastocal.validation.held_out import predict_left_out_squares
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -496,7 +495,7 @@ def _run_search_round(
     if settled or following.number >= settings.linearizations:
         return replace(
             evidence,
-            adopted=_is_adopted(evidence),
+            expected_to_help=_is_expected_to_help(evidence),
             settled=settled,
             fitted=fitted,
             tested=tested,
@@ -510,8 +509,8 @@ def _limit_pose_error(fitted: Fit, subset: FittedSubset, limit_rad: float) -> Fi
     return _refit_from(fitted, subset.search_sample, noise, subset.search_tolerance)
 
 
-def _is_adopted(evidence: Evidence) -> bool:
-    """Whether the effects found enter the model."""
+def _is_expected_to_help(evidence: Evidence) -> bool:
+    """Whether the effects found are expected to make predictions better."""
     return bool(evidence.conclusion.best.named) and model_averaging.is_expected_to_help(
         evidence.design.problem, evidence.posterior, evidence.named_model
     )
@@ -732,38 +731,85 @@ def _add_effects(
     full_model = rows.fitted
     if full_model is not evidence.fitted or subset.search_sample is not observations:
         full_model = subset.fit_to_all(full_model)
-    named = evidence.conclusion.best.named
     conclusion = verdict.allow_related_mechanisms(
-        evidence.conclusion, find_oversized_effects(full_model, named)
+        evidence.conclusion,
+        find_oversized_effects(full_model, evidence.conclusion.best.named),
     )
-    compared = [declared, full_model]
-    if not evidence.adopted:
-        compared = [full_model]
-        if named:
-            compared = [_refit_declared(evidence, declared, observations)]
-    losses = _describe_losses(frames, compared, observations, context.settings)
+    models = (declared, full_model)
+    refusal = _refuse_adoption(subset, evidence, models, context.settings)
     evidence = replace(
-        evidence, conclusion=conclusion, adopted=evidence.adopted and not losses
+        evidence,
+        conclusion=conclusion,
+        adopted=evidence.expected_to_help and not refusal,
     )
+    compared = _list_compared(evidence, models, observations)
+    losses = adoption.describe_losses(frames, compared, observations, context.settings)
+    evidence = replace(evidence, adopted=evidence.adopted and not losses)
     steps = [result.steps[0], Step("declared model", "declared", compared[0])]
     if evidence.adopted:
         steps += _effect_steps(subset, full_model, evidence)
     elif losses and losses[0]:
         kept = fit_model(frames.model, observations, compared[0].noise, frames.estimate)
         steps.append(Step("frames and targets, kept", "kept", kept))
-    tested_fit, repeatable = evidence.tested
-    if tested_fit is not steps[-1].fitted:
-        repeatable = detect_repeatable_residual(
-            steps[-1].fitted, observations, context.seed
-        )
     result = replace(
         result,
         steps=tuple(steps),
         full_model=full_model,
-        warnings=(*result.warnings, *filter(None, losses)),
-        repeatable=repeatable,
+        warnings=(*result.warnings, *refusal, *filter(None, losses)),
+        repeatable=_test_residual(context, evidence, steps[-1].fitted, observations),
     )
     return _contradict(context, result, evidence, rows.standing_out)
+
+
+def _test_residual(
+    context: _Context, evidence: Evidence, kept: Fit, observations: Observations
+) -> RepeatableResidual | None:
+    """Test the residual of the model that is kept, unless the search has tested it."""
+    tested_fit, repeatable = evidence.tested
+    if tested_fit is kept:
+        return repeatable
+    return detect_repeatable_residual(kept, observations, context.seed)
+
+
+def _list_compared(
+    evidence: Evidence, models: tuple[Fit, Fit], observations: Observations
+) -> list[Fit]:
+    """List the models to compare with frames alone: the declared one, and the one with
+    the effects found if these are adopted.
+
+    `models`: without and with the effects.
+    """
+    declared, full_model = models
+    if evidence.adopted:
+        return [declared, full_model]
+    if evidence.conclusion.best.named:
+        return [_refit_declared(evidence, declared, observations)]
+    return [full_model]
+
+
+def _refuse_adoption(
+    subset: FittedSubset,
+    evidence: Evidence,
+    models: tuple[Fit, Fit],
+    settings: Settings,
+) -> list[str]:
+    """Say why the effects found do not enter the model; nothing if they do, or if there
+    are none.
+
+    `models`: without and with the effects, fitted to all observations.
+    """
+    if not evidence.conclusion.best.named:
+        return []
+    if not evidence.expected_to_help:
+        return [adoption.TOO_UNCERTAIN]
+    sample = subset.search_sample
+    if sample is not subset.case.observations:
+        declared, full_model = models
+        models = (
+            _refit_from(declared, sample, declared.noise, INTERMEDIATE_TOLERANCE),
+            _refit_from(full_model, sample, full_model.noise, INTERMEDIATE_TOLERANCE),
+        )
+    return adoption.describe_missing_gain(*models, sample, settings)
 
 
 def _refit_declared(
@@ -816,51 +862,6 @@ def _contradict(
         warnings=tuple(warnings),
         contradictions=tuple(contradictions),
     )
-
-
-def _describe_losses(
-    frames: Fit, models: Sequence[Fit], observations: Observations, settings: Settings
-) -> list[str]:
-    """Describe how models with few measurements for their parameters predict left-out
-    training poses worse than frames alone, by more than a standard error.
-
-    Parameters
-    ----------
-    frames
-        Fit of frames and targets alone.
-    models
-        The declared model and, if it has any, the one with the effects found.
-    observations
-        What all were fitted to.
-    settings
-        Settings of the diagnosis.
-
-    Returns
-    -------
-    list of str
-        A sentence for each model, empty for one that does not predict worse; no
-        sentences at all if the last model does not.
-    """
-    names = ("declared model", "model with the effects found")
-    sentences = []
-    for fitted, name in zip(models, names, strict=False):
-        sentences.append("")
-        effective = count_effective_parameters(fitted)
-        if fitted.residual.size >= settings.numbers_a_parameter * effective:
-            continue
-        squares = predict_left_out_squares(fitted, observations)
-        frames_squares = predict_left_out_squares(frames, observations)
-        loss = squares - frames_squares
-        if loss.mean() > loss.std(ddof=1) / np.sqrt(len(loss)):
-            rms_mm = 1e3 * np.sqrt(squares.mean())
-            frames_rms_mm = 1e3 * np.sqrt(frames_squares.mean())
-            sentences[-1] = (
-                f"training poses left out in turn are off by {rms_mm:.2f} mm RMS by the"
-                f" {name}, by {frames_rms_mm:.2f} mm with frames and targets alone:"
-                f" {len(loss)} poses are too few for {effective:.0f} parameters, and"
-                f" the {name} is not kept"
-            )
-    return sentences if sentences[-1] else []
 
 
 def _effect_steps(subset: FittedSubset, final: Fit, evidence: Evidence) -> list[Step]:

@@ -53,6 +53,7 @@ class Settings:
     ambiguity_loss: float = _DEFAULT.ambiguity_loss
     width_loss: float = _DEFAULT.width_loss
     useful: float = _DEFAULT.useful
+    adoption_groups: int = _DEFAULT.adoption_groups
     prior_share: float = _DEFAULT.prior_share
     law_tolerance: float = _DEFAULT.law_tolerance
     confusable_share: float = _DEFAULT.confusable_share

@@ -224,16 +224,10 @@ def _warn_of_search(
     effects: tuple[Effect, ...],
     settings: Settings,
 ) -> tuple[str, ...]:
-    """Return warnings of effects that were not adopted or are implausible, and of a
-    search that did not settle."""
-    warnings = []
-    if effects and not evidence.adopted:
-        warnings.append(
-            "what was found is too uncertain to make predictions better: "
-            "the model stays as declared"
-        )
+    """Return warnings of effects that are implausible, and of a search that did not
+    settle."""
     keys = [key for effect in effects for key in effect.members]
-    warnings += warn_of_implausible_values(full_model, keys)
+    warnings = [*warn_of_implausible_values(full_model, keys)]
     if not evidence.settled:
         warnings.append(
             f"the problem was linearised {settings.linearizations} times, "

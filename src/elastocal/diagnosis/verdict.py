@@ -128,8 +128,10 @@ class Evidence:
         The verdict.
     fitted : Fit
         The model found, fitted to the observations of the search.
+    expected_to_help : bool
+        Whether the effects found are expected to make predictions better.
     adopted : bool
-        Whether the effects found enter the model.
+        Whether they enter the model.
     settled : bool
         Whether a further linearisation would lead to the same model.
     tested : tuple
@@ -142,6 +144,7 @@ class Evidence:
     alarm: Alarm
     conclusion: Conclusion
     fitted: Fit
+    expected_to_help: bool = False
     adopted: bool = False
     settled: bool = False
     tested: tuple[Fit | None, RepeatableResidual | None] = (None, None)

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import stdtrit
 
-from elastocal.campaigns.holdout import number_configurations
 from elastocal.fitting.least_squares import (
     INTERMEDIATE_TOLERANCE,
     fit_model,
@@ -23,7 +22,7 @@ from elastocal.fitting.least_squares import (
 )
 from elastocal.fitting.linearization import linearize_coordinates
 from elastocal.fitting.model import compute_residuals, evaluate_conditions
-from elastocal.fitting.observations import index_poses, select_states, split_into_blocks
+from elastocal.fitting.observations import select_states, split_into_blocks
 from elastocal.validation.transfer import place_unseen_sessions
 
 if TYPE_CHECKING:
@@ -341,30 +340,50 @@ def refit_without_folds(
         yield place_unseen_sessions(refit, observations)
 
 
-def predict_left_out_squares(fitted: Fit, observations: Observations) -> np.ndarray:
-    """Predict each configuration from all others; return mean square position errors.
+def predict_left_out_residuals(
+    fitted: Fit, observations: Observations, group: np.ndarray
+) -> np.ndarray:
+    """Predict groups of observations from all other observations.
 
-    By a single step in closed form; parameters that the fit does not identify stay
-    fixed. Returns a (configurations,) array, m².
+    By a single step in closed form; parameters that only the left-out group determines
+    stay as they are.
+
+    Parameters
+    ----------
+    fitted : Fit
+    observations : Observations that it was fitted to
+    group : (M,) int array, group of each observation, 0 .. G-1
+
+    Returns
+    -------
+    (M, rows) array, measured minus predicted, m and rad, base axes
     """
     residual = fitted.whiten(fitted.residual)
-    states = observations.states
-    configuration = number_configurations(states.joint_angles, index_poses(states))[
-        observations.cluster
-    ]
+    variance, axes = np.linalg.eigh(fitted.covariance)
+    covariance_root = axes * np.sqrt(np.maximum(variance, 0.0))
     blocks = list(fitted.iterate_sensitivities(observations))
     plain = np.concatenate([block[1] for block in blocks])
-    whitened = np.concatenate([block[2] for block in blocks])
-    mean_squares = []
-    for number in range(configuration.max() + 1):
-        members = configuration == number
-        count = members.sum() * whitened.shape[1]
-        rows = whitened[members].reshape(count, whitened.shape[2])
-        gain = fitted.covariance @ rows.T
-        inverse = np.linalg.pinv(
-            np.eye(len(rows)) - rows @ gain, rcond=_SHARE_ROUNDING, hermitian=True
-        )
-        step = gain @ (inverse @ residual[members].ravel())
-        errors = fitted.residual[members][:, :3] + plain[members][:, :3] @ step
-        mean_squares.append((errors**2).sum(axis=1).mean())
-    return np.array(mean_squares)
+    whitened = np.concatenate([block[2] @ covariance_root for block in blocks])
+    left_out = np.empty_like(fitted.residual)
+    for number in range(group.max() + 1):
+        members = group == number
+        step = covariance_root @ _solve_without(whitened[members], residual[members])
+        left_out[members] = fitted.residual[members] + plain[members] @ step
+    return left_out
+
+
+def _solve_without(sensitivities: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    """Change of parameters when rows leave a fit, in coordinates in which the parameter
+    covariance is the unit matrix.
+
+    With U S V' the sensitivities (M, rows, P) of these rows, it is V S / (1 - S^2) U' r;
+    zero along what no other row determines.
+    """
+    rows = sensitivities.reshape(residual.size, sensitivities.shape[2])
+    left, singular, right = np.linalg.svd(rows, full_matrices=False)
+    share_of_others = 1.0 - singular**2
+    is_determined = share_of_others > _SHARE_ROUNDING
+    factor = np.where(is_determined, singular, 0.0)
+    factor /= np.where(is_determined, share_of_others, 1.0)
+    change: np.ndarray = right.T @ (factor * (left.T @ residual.ravel()))
+    return change
