@@ -206,6 +206,17 @@ def test_only_the_exact_set_of_mechanisms_is_true(truth, mechanisms, expected):
     assert is_true(mechanisms, truth) == expected
 
 
+def test_an_effect_that_a_case_hides_is_as_good_as_outside_of_the_catalogue():
+    hidden = ("payload", "hysteresis")
+    assert is_true(("joint_tilt", "other"), PAYLOAD, hidden)
+    assert not is_true(("joint_tilt",), PAYLOAD, hidden)
+    assert is_true(("payload",), PAYLOAD, ("hysteresis",))
+    sets = [{"mechanisms": ["other"], "probability": 0.9}]
+    verdict = {"probabilities": {"sets": sets}}
+    assert score_probabilities(PAYLOAD, verdict, hidden)["correct"]
+    assert not score_probabilities(PAYLOAD, verdict)["correct"]
+
+
 @pytest.mark.parametrize(
     ("probabilities", "rank", "expected"),
     [

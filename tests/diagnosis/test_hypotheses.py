@@ -8,8 +8,14 @@ from made_problems import make_term
 from support import UR10, robot_of
 from synthetic import equipped
 
+from elastocal.diagnosis import hypotheses
 from elastocal.diagnosis.discrepancy import FORCE, NEIGHBOURS, OWN, Discrepancy
-from elastocal.diagnosis.hypotheses import OTHER, build_model_prior, build_terms
+from elastocal.diagnosis.hypotheses import (
+    GROSS_ERROR,
+    OTHER,
+    build_model_prior,
+    build_terms,
+)
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import candidates_on
 
@@ -178,3 +184,22 @@ def test_plausible_sizes_fall_with_the_order_of_a_harmonic_and_signs_are_those_o
         assert term.signs.tolist() == [p.sign for p in candidate.parameters]
     assert max(term.sizes.max() / term.sizes.min() for term in terms) > 1.1
     assert any(term.signs.any() for term in terms)
+
+
+@pytest.mark.parametrize("length", [1, 10, 100])
+def test_the_prior_probability_of_nothing_does_not_depend_on_the_catalogue(
+    length, monkeypatch
+):
+    """With independent mechanisms, one of a hundred would nearly always act."""
+    names = [f"mechanism {number}" for number in range(length)]
+    monkeypatch.setattr(hypotheses, "list_effects", lambda: dict.fromkeys(names))
+    terms = [make_term(name, (1,), column) for column, name in enumerate(names)]
+    other = make_term(OTHER, (1,), length)
+    prior = build_model_prior([*terms, other], SETTINGS)
+    log_odds = [prior.compute_log_odds([term]) for term in [*terms, other]]
+    # The sum over all sets of mechanisms is a product.
+    any_odds = np.prod(1.0 + np.exp(log_odds)) - 1.0
+    any_odds *= np.exp(prior.correct_for_nothing([other]))
+    assert 1.0 / (1.0 + any_odds) == pytest.approx(SETTINGS.nothing_probability)
+    assert prior.correct_for_nothing([]) == 0.0
+    assert prior.correct_for_nothing([make_term(GROSS_ERROR, ("row", 1), 0)]) == 0.0

@@ -78,6 +78,7 @@ def enumerate_models(problem):
                 np.full(size, 0.1),
             )
             log_prior = problem.prior.compute_log_odds(terms)
+            log_prior += problem.prior.correct_for_nothing(terms)
             log_odds[model] = evidence.log_evidence + log_prior
     values = np.array(list(log_odds.values()))
     return dict(zip(log_odds, np.exp(values - log_sum_exp(values)), strict=True))

@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import gammaln, logit, logsumexp
 
+from elastocal.effects.catalogue import list_effects
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
@@ -89,13 +91,24 @@ class ModelPrior:
     2010). Gross errors are independent accidents: each has the same prior odds, however
     many there are.
 
+    If mechanisms were independent, the probability that none acts would be a product
+    over the catalogue, and would fall with every mechanism that is added to it. It is
+    therefore a setting of its own.
+
     Attributes
     ----------
     log_odds : by mechanism, (L + 1,) for a mechanism with L locations: log prior odds
         of one given set of k locations against its absence
+    log_odds_of_any : what these log odds lack in every model that has a mechanism
     """
 
     log_odds: dict[str, np.ndarray]
+    log_odds_of_any: float
+
+    def correct_for_nothing(self, terms: Iterable[ModelTerm]) -> float:
+        """Correction of the log odds of a model for the prior probability of nothing."""
+        is_any = any(term.mechanism != GROSS_ERROR for term in terms)
+        return self.log_odds_of_any if is_any else 0.0
 
     def compute_log_odds(self, terms: Iterable[ModelTerm]) -> float:
         """Log prior odds of a model against the declared model alone."""
@@ -144,7 +157,16 @@ def build_model_prior(terms: Sequence[ModelTerm], settings: Settings) -> ModelPr
         log_odds[mechanism] = np.append(
             0.0, presence + geometric - logsumexp(geometric) - log_sets
         )
-    return ModelPrior(log_odds)
+    return ModelPrior(log_odds, _compute_log_odds_of_any(settings))
+
+
+def _compute_log_odds_of_any(settings: Settings) -> float:
+    """Log of the factor between the prior odds that any mechanism acts and those of
+    independent mechanisms, of which the catalogue may have any number."""
+    log_of_none = len(list_effects()) * np.log1p(-settings.mechanism_probability)
+    log_of_none += np.log1p(-settings.other_probability)
+    log_odds_of_none = log_of_none - np.log(-np.expm1(log_of_none))
+    return float(log_odds_of_none - logit(settings.nothing_probability))
 
 
 def build_terms(

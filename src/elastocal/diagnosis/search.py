@@ -13,7 +13,7 @@ from __future__ import annotations
 from bisect import bisect
 from collections import Counter
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from heapq import nlargest
 from typing import TYPE_CHECKING
@@ -575,7 +575,15 @@ class BeamSearch:
         models = [self.evaluated.get(model) or self.evaluate(model) for model in best]
         if () not in best:
             models.append(self.evaluated[()])
+        models = [self._correct_for_nothing(model) for model in models]
         models.sort(key=lambda model: -model.log_odds)
         log_odds = np.array([model.log_odds for model in models])
         probabilities = np.exp(log_odds - log_sum_exp(log_odds))
         return Posterior(tuple(models), probabilities)
+
+    def _correct_for_nothing(self, model: ScoredModel) -> ScoredModel:
+        """Correct the log odds of a model for the prior probability of nothing, which
+        is the same for all models with a mechanism, so that the search needs none."""
+        terms = [self.problem.terms[number] for number in model.term_indices]
+        correction = self.problem.prior.correct_for_nothing(terms)
+        return replace(model, log_odds=model.log_odds + correction)

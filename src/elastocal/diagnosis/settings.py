@@ -36,6 +36,7 @@ class Settings:
     alarm_level: float = _DEFAULT.alarm_level
     detection_level: float = _DEFAULT.detection_level
     alarm_draws: int = _DEFAULT.alarm_draws
+    nothing_probability: float = _DEFAULT.nothing_probability
     mechanism_probability: float = _DEFAULT.mechanism_probability
     gravity_probability: float = _DEFAULT.gravity_probability
     other_probability: float = _DEFAULT.other_probability

@@ -148,7 +148,7 @@ def build_case_row(
         "oracle_rms_m": oracle["heldout"]["rms_m"],
         "limit_detected": float(limit["detected"]),
         "limit_right": float(limit["right"]),
-        **score_probabilities(truth, verdict),
+        **score_probabilities(truth, verdict, _find_hidden_effects(plan, case)),
     }
 
 
@@ -234,10 +234,26 @@ def _describe_errors(verdict: Document) -> dict[str, Any]:
     }
 
 
-def score_probabilities(truth: Document, verdict: Document) -> dict[str, Any]:
+def _find_hidden_effects(plan: Plan, case: Document) -> Collection[str]:
+    """Find the effects that no analyst of a case can test, because its setting omits the
+    covariates that their laws need."""
+    hidden: Collection[str] = plan["settings"][case["setting"]].get("hides", ())
+    return hidden
+
+
+def score_probabilities(
+    truth: Document, verdict: Document, hidden: Collection[str] = ()
+) -> dict[str, Any]:
     """Compare the stated probabilities with the truth.
 
     A hypothesis is a set of mechanisms, as in verdict.json; the empty set is "nothing".
+
+    Parameters
+    ----------
+    truth, verdict : mapping
+        As of `build_case_row`.
+    hidden : collection of str
+        Effects that cannot be tested in this case.
 
     Returns
     -------
@@ -258,22 +274,25 @@ def score_probabilities(truth: Document, verdict: Document) -> dict[str, Any]:
     return {
         "stated": top["probability"],
         "top": _join(sorted(top["mechanisms"])),
-        "correct": is_true(top["mechanisms"], truth),
+        "correct": is_true(top["mechanisms"], truth, hidden),
         "held": any(
-            is_true(hypothesis["mechanisms"], truth) for hypothesis in credible
+            is_true(hypothesis["mechanisms"], truth, hidden) for hypothesis in credible
         ),
     }
 
 
-def is_true(mechanisms: Collection[str], truth: Document) -> bool:
+def is_true(
+    mechanisms: Collection[str], truth: Document, hidden: Collection[str] = ()
+) -> bool:
     """Check whether a set of mechanisms is the true one of a case.
 
-    If the true mechanism is outside of the catalogue, every set with "other" is true. A
+    If the true mechanism is outside of the catalogue, or outside of what the case lets
+    anyone test (`hidden`), every set with "other" is true: no set can name it. A
     mechanism that the joint compliances absorb at any size counts as nothing, because
     no measurement can distinguish the two.
     """
     effects = truth["case"]["effects"]
-    if any(effect.startswith(OUTSIDE) for effect in effects):
+    if any(effect.startswith(OUTSIDE) or effect in hidden for effect in effects):
         return OTHER in mechanisms
     absorbed = {
         defect["effect"] for defect in truth["defects"] if defect["of"] == "raw"
