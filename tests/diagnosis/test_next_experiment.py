@@ -28,7 +28,8 @@ from elastocal.diagnosis.search import ScoredModel, search_models
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.verdict import conclude
 
-SETTINGS = Settings(pose_steps=(0.0, 2.0), other_features=6)
+# An unknown mechanism is improbable, so that the candidates alone compete.
+SETTINGS = Settings(pose_steps=(0.0, 2.0), other_features=6, other_probability=0.02)
 RAISED = Alarm(0.002, 10.0, raised=True)
 ELASTIC = ("link_elasticity", "base_compliance", "joint_tilt")
 

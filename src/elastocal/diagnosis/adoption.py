@@ -2,13 +2,12 @@
 without the held-out poses.
 
 Poses that are left out one at a time have neighbours among the fitted ones, and
-whatever is common to neighbours passes for prediction [1]_. Groups of neighbouring
-poses are therefore left out together. The selection of the model takes part in neither
-group of the held-out poses, which stay closed until the end (nested validation [2]_).
-The difference of two models is taken group by group, and a difference within a standard
-error is none (the one-standard-error rule [3]_). No estimate of the variance of
-cross-validated errors is unbiased [4]_; the groups share least, so that their spread is
-used, not that of the poses.
+whatever neighbours have in common passes for prediction. Groups of neighbouring poses
+are therefore left out together [1]_. This choice is made inside the training poses, and
+the held-out poses judge its result (nested validation [2]_). Two models are compared
+group by group, and a gain within a standard error is none (the one-standard-error rule
+[3]_). No estimate of the variance of cross-validated errors is unbiased [4]_. Groups
+have less in common than poses, so that their spread is used.
 
 References
 ----------
