@@ -45,8 +45,8 @@ def diagnose_cases(count, seed, folder):
 def main():
     """Print the figures of a number of cases."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cases", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=9301)
+    parser.add_argument("--cases", type=int, default=180)
+    parser.add_argument("--seed", type=int, default=11701)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         cases, locations = diagnose_cases(arguments.cases, arguments.seed, Path(folder))
