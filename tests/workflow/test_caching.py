@@ -101,6 +101,45 @@ def _figures_and_a_script(study):
     os.utime(study.path("workflow/scripts/typeset_table.py"), (1e9, 1e9))
 
 
+# A file of this size has a checksum too; Snakemake's own limit is 1 MB, and ours was 100.
+LARGE_BYTES = 150_000_000
+READS_LARGE_FILE = """
+rule read_large_file:
+    input: "large.bin"
+    output: "made.txt"
+    shell: "echo read > {output}"
+"""
+
+
+def test_a_large_file_counts_by_its_contents_too(tmp_path):
+    (tmp_path / "Snakefile").write_text(READS_LARGE_FILE, encoding="utf-8")
+    large_file = tmp_path / "large.bin"
+    with open(large_file, "wb") as file:
+        file.truncate(LARGE_BYTES)
+    profile = REPOSITORY / "profiles" / "default"
+
+    def snakemake(*arguments):
+        command = [sys.executable, "-m", "snakemake", "--workflow-profile", profile]
+        done = subprocess.run(
+            [*command, "-j1", *arguments],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=HUNG_S,
+        )
+        assert done.returncode == 0, done.stderr[-2000:]
+        return done.stdout + done.stderr
+
+    snakemake()
+    later = (tmp_path / "made.txt").stat().st_mtime + 60
+    os.utime(large_file, (later, later))
+    assert "Nothing to be done" in snakemake("-n")
+    with open(large_file, "r+b") as file:
+        file.write(b"edited")
+    os.utime(large_file, (later, later))
+    assert "read_large_file" in snakemake("-n")
+
+
 # Jobs of the grid that run again, by their rules and wildcards; further rules that do;
 # and rules that do not.
 EDITS = {
