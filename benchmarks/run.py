@@ -16,7 +16,15 @@ if TYPE_CHECKING:
     # With it comes numpy, whose threads are to be set first.
     from common import Row
 
-NAMES = ("kinematics", "identification", "study", "rerun", "scale", "engine")
+NAMES = (
+    "kinematics",
+    "identification",
+    "study",
+    "rerun",
+    "plan",
+    "scale",
+    "engine",
+)
 REPORT = Path(__file__).resolve().parents[1] / "reports" / "benchmarks.csv"
 
 

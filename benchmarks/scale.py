@@ -32,8 +32,8 @@ MEMORY_LIMIT_GB = 1.5
 # when it ends (Linux).
 NOTE_PEAK = """
 
-def run(step, job, *checked, run=run):
-    run(step, job, *checked)
+def run(step, job, run=run, **options):
+    run(step, job, **options)
     status = dict(line.split(":", 1) for line in open("/proc/self/status", encoding="utf-8"))
     with open(job.output[0] + ".peak_kB", "w", encoding="utf-8") as file:
         file.write(status["VmHWM"].split()[0])

@@ -202,6 +202,26 @@ def test_an_edit_reruns_what_depends_on_it(edit, finished_paper, every_job):
     assert rerun <= rules(planned) and not untouched & rules(planned)
 
 
+def test_sources_cost_no_job_an_input_and_are_in_every_record(paper):
+    """As inputs they took half of the time in which Snakemake plans thousands of
+    jobs."""
+    inputs = paper.inputs_by_rule(PAPER)
+    assert not [file for file in inputs["identify"] if file.startswith("src/")]
+    assert len(inputs["identify"]) < 10
+    for kind in ("identified", "metrics"):
+        path = f"results/records/results/{kind}/{ROBOT}/{LEVEL}um/6DoF.parquet.json"
+        record = json.loads(paper.path(path).read_text(encoding="utf-8"))
+        sources = {file for file in record["inputs"] if file.endswith(".py")}
+        modules = closure(
+            paper.path("workflow/scripts") / RUN_STEP,
+            paper.path("src"),
+            "elastocal.study.evaluation",
+        )
+        names = {file.relative_to(paper.folder).as_posix() for file in modules}
+        names = {name for name in names if name.endswith(".py")}
+        assert sources == names | {f"workflow/scripts/{RUN_STEP}"}
+
+
 def test_what_is_added_runs_no_job_of_what_is_there(finished_paper):
     """A robot, a strategy and a noise level: each a file or an entry."""
     study = finished_paper

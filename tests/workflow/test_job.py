@@ -20,12 +20,17 @@ from elastocal.errors import InputError
 
 INPUT = "own/a.csv"
 OUTPUT = "results/b.csv"
+SOURCE = "own/step.py"
 
 
 def job_of(**files):
     origin = {"commit": "c0ffee", "configuration_sha256": "d16e57", "seed": 1}
     return SimpleNamespace(
-        **files, rule="copy", wildcards={"robot": "kuka"}, config={"origin": origin}
+        **files,
+        params={"sources": (SOURCE,)},
+        rule="copy",
+        wildcards={"robot": "kuka"},
+        config={"origin": origin},
     )
 
 
@@ -35,6 +40,7 @@ def job(tmp_path, monkeypatch):
     for folder in ("own", "results/logs", ".snakemake"):
         (tmp_path / folder).mkdir(parents=True)
     (tmp_path / INPUT).write_text("1\n")
+    (tmp_path / SOURCE).write_text("EDITED = False\n")
     return job_of(input=[INPUT], output=[OUTPUT], log=["results/logs/b.log"])
 
 
@@ -110,8 +116,9 @@ def test_a_job_that_ended_well_leaves_a_record_of_what_it_read_and_wrote_when_an
         Path("results/records/results/b.csv.json").read_text(encoding="utf-8")
     )
     digest = hashlib.sha256(b"1\n").hexdigest()
+    source_digest = hashlib.sha256(b"EDITED = False\n").hexdigest()
     assert (
-        record["inputs"] == {INPUT: digest}
+        record["inputs"] == {INPUT: digest, SOURCE: source_digest}
         and record["outputs"] == [OUTPUT]
         and record["files"] == {OUTPUT: digest}
     )

@@ -15,9 +15,12 @@ from snakemake.api import (
     SnakemakeApi,
 )
 from snakemake.benchmark import BenchmarkRecord
+from snakemake.dag import ScriptProcessor
+from snakemake.executors.dryrun import Executor as DryRunExecutor
 from snakemake.io import _IOFile
 from snakemake.script import PythonScript
 from snakemake.settings.types import MaxJobsPerTimespan, SchedulingSettings
+from snakemake_interface_executor_plugins.executors.base import AbstractExecutor
 from warm_start import StartedScript
 
 SNAKEFILE = """
@@ -122,6 +125,44 @@ def test_a_checksum_is_computed_once_while_the_file_stays_as_it_is(
     assert asyncio.run(_IOFile.checksum(file, 10, force=True)) == "longer"
 
 
+def test_a_script_is_checked_for_the_first_job_of_a_rule(monkeypatch):
+    checked = []
+    monkeypatch.setattr(
+        ScriptProcessor, "process_job", lambda processor, job: checked.append(job)
+    )
+    snakemake_internals.check_scripts_once()
+    fixed = SimpleNamespace(name="fixed", script="make_table.py")
+    named = SimpleNamespace(name="named", script="make_{name}.py")
+    jobs = [SimpleNamespace(rule=rule) for rule in (fixed, fixed, named, named)]
+    processor = ScriptProcessor.__new__(ScriptProcessor)
+    for job in jobs:
+        processor.process_job(job)
+    assert checked == [jobs[0], jobs[2], jobs[3]]
+
+
+@pytest.mark.parametrize(
+    ("settings", "is_printed"),
+    [
+        ({"log_handler_settings": {"ours": None}}, False),
+        ({"log_handler_settings": {"ours": None}, "printshellcmds": True}, True),
+        ({"log_handler_settings": {"ours": None}, "verbose": True}, True),
+        ({"log_handler_settings": {}}, True),
+    ],
+)
+def test_a_dry_run_formats_the_messages_that_its_logger_prints(
+    monkeypatch, settings, is_printed
+):
+    monkeypatch.setattr(DryRunExecutor, "printjob", print_job := lambda *_: None)
+    workflow = SimpleNamespace(output_settings=OutputSettings(**settings))
+    snakemake_internals.skip_unprinted_messages(workflow, "ours")
+    assert (DryRunExecutor.printjob is print_job) == is_printed
+
+
+def test_scripts_and_messages_are_handled_where_we_replace_them():
+    assert "script_type" in inspect.getsource(ScriptProcessor.process_job)
+    assert "log_info" in inspect.getsource(AbstractExecutor.printjob)
+
+
 @pytest.mark.parametrize(
     ("limit", "limiter"), [("100/1s", None), ("99/1s", "limiter"), (None, "limiter")]
 )
@@ -153,7 +194,7 @@ def test_a_rule_without_log_and_benchmark_gets_ours_and_keeps_its_own(workflow):
     for name in ("make_table", "draw_table"):
         rule = named(workflow, name)
         snakemake_internals.set_log_and_benchmark(rule, "{name}.log", "{name}.tsv")
-        rule.set_input(sources=["a.py"])
+        rule.set_params(sources=("a.py",))
     assert list(named(workflow, "make_table").log) == ["{name}.log"]
     assert list(named(workflow, "draw_table").log) == ["logs/{name}.log"]
     assert str(named(workflow, "make_table").benchmark) == "{name}.tsv"

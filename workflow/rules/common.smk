@@ -17,7 +17,13 @@ from elastocal.campaigns.importers import (
     list_league_data,
 )
 from elastocal.errors import InputError
-from elastocal.io.origin import SOURCES_DIGEST, Origin, digest_configuration, list_versions
+from elastocal.io.origin import (
+    SOURCE_FILES,
+    SOURCES_DIGEST,
+    Origin,
+    digest_configuration,
+    list_versions,
+)
 from elastocal.io.records import compute_sha256
 from elastocal.report.outcome import describe_outcome
 from elastocal.study.configuration import check_study, count_components, override_entries
@@ -73,6 +79,10 @@ def shown_figure(file, caption, category, shows):
 # The modules imported so far stay until the end. Without this line, garbage collection searches them again and again while Snakemake
 # plans the jobs, which took a fifth of a rerun that had nothing to do.
 gc.freeze()
+
+# Work that Snakemake would do for each job again, or for nothing.
+snakemake_internals.check_scripts_once()
+snakemake_internals.skip_unprinted_messages(workflow, "elastocal")
 
 # Entries of --config. They are read again here, because Snakemake reads numbers inside a mapping as text.
 ENTRIES = [entry.partition("=") for entry in snakemake_internals.config_arguments(workflow)]
@@ -174,10 +184,9 @@ def panel_settings(robot, **limit):
 
 
 def sources(step):
-    """Return the script that runs a step, and the package modules that it imports, as inputs of a rule.
+    """Return the script that runs a step, and the package modules that it imports.
 
-    `step` is a script, or a function of the packages that `run_step.py` calls. The files are `ancient`, because their dates do not
-    matter: `watch_sources` compares their contents.
+    `step` is a script, or a function of the packages that `run_step.py` calls.
     """
     if step.endswith(".py"):
         script, modules = step, []
@@ -188,7 +197,7 @@ def sources(step):
         files = [path, *closure(path, PACKAGES, *modules)]
     except InputError as error:
         sys.exit(str(error))
-    return [ancient(placed(file)) for file in files]
+    return tuple(map(placed, files))
 
 
 checksum_once = cache(compute_sha256)
@@ -200,7 +209,11 @@ def digest_of(files):
 
 
 def complete_rules():
-    """Give each rule a log and a benchmark named after it and its wildcards, and each script its sources as inputs."""
+    """Give each rule a log and a benchmark named after it and its wildcards, and each script its sources.
+
+    The sources are a parameter, which all jobs of a rule share. Snakemake looks up each input of each job anew, so as inputs they took
+    half of the time and of the memory in which it lays out the jobs.
+    """
     for definition in workflow.rules:
         if snakemake_internals.runs_no_job(definition):
             continue
@@ -209,9 +222,9 @@ def complete_rules():
         snakemake_internals.set_log_and_benchmark(
             definition, f"results/logs/{name}.log", f"results/timings/{name}.tsv"
         )
-        if definition.is_script and "sources" not in definition.input.keys():
+        if definition.is_script:
             step = definition.params.get("step") or snakemake_internals.name_of_script(definition)
-            definition.set_input(sources=sources(step))
+            definition.set_params(**{SOURCE_FILES: sources(step)})
 
 
 def watch_sources():
@@ -221,14 +234,15 @@ def watch_sources():
     """
     environment_sha256 = digest_configuration(list_versions(ROOT))
     for definition in workflow.rules:
-        if "sources" not in definition.input.keys():
+        if not definition.is_script:
             continue
         files = [
             file
             for file in definition.input
             if isinstance(file, str) and not MADE_FILE.match(file) and Path(file).is_file()
         ]
-        definition.set_params(**{SOURCES_DIGEST: f"{digest_of(files)} {environment_sha256}"})
+        digest = digest_of([*files, *definition.params.get(SOURCE_FILES)])
+        definition.set_params(**{SOURCES_DIGEST: f"{digest} {environment_sha256}"})
 
 
 def files_behind(targets):

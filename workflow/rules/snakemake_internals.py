@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from snakemake.benchmark import benchmarked
+from snakemake.executors.dryrun import Executor as DryRunExecutor
 from snakemake.io import _IOFile
 from snakemake.iocontainers import Wildcards
 from snakemake.script import PythonScript
@@ -71,6 +72,45 @@ def remember_checksums() -> None:
         return checksums[key]
 
     _IOFile.checksum = checksum
+
+
+def check_scripts_once() -> None:
+    """Check once for each rule that its script exists.
+
+    Snakemake reads the script of each job, although a script whose name has no
+    wildcards is the same for all jobs of a rule.
+    """
+    # Modules of Snakemake import one another, and this one cannot be the first.
+    from snakemake.dag import ScriptProcessor
+
+    check_script = ScriptProcessor.process_job
+    checked: set[tuple[str, str]] = set()
+
+    def process_job(processor: Any, job: Any) -> None:
+        script = getattr(job.rule, processor.script_type)
+        key = (processor.script_type, job.rule.name)
+        if key in checked and "{" not in str(script):
+            return
+        check_script(processor, job)
+        checked.add(key)
+
+    ScriptProcessor.process_job = process_job
+
+
+def skip_unprinted_messages(workflow: Any, logger: str) -> None:
+    """Format no messages about jobs in a dry run whose logger does not print them.
+
+    Parameters
+    ----------
+    workflow : Workflow
+    logger : str
+        Name of the logger that prints jobs only with `-p` or `--verbose`.
+    """
+    settings = workflow.output_settings
+    prints_jobs = settings.printshellcmds or settings.verbose
+    if prints_jobs or logger not in settings.log_handler_settings:
+        return
+    DryRunExecutor.printjob = lambda executor, job: None
 
 
 def lift_rate_limit(workflow: Any) -> None:

@@ -3,7 +3,7 @@
 import fcntl
 import sys
 import traceback
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import Any, Protocol
 from import_log import write_log
 
 from elastocal.errors import InputError, describe_system_fault
-from elastocal.io.origin import Origin, list_versions
+from elastocal.io.origin import SOURCE_FILES, Origin, list_versions
 from elastocal.io.records import JobRecord, digest_inputs, write_records
 
 # Folder of the Snakefile. Snakemake runs a copy of a script under the name of the file.
@@ -35,7 +35,7 @@ class Job(Protocol):
 
 
 def run(
-    step: Callable[[Job], None], snakemake: Job, checked: Iterable[str] | None = None
+    step: Callable[[Job], None], snakemake: Job, *, check_inputs: bool = True
 ) -> None:
     """Run a step as a job: check its inputs, call it, and record what it has written.
 
@@ -47,9 +47,9 @@ def run(
         The work of the job.
     snakemake : Job
         The object that Snakemake gives to the script.
-    checked : iterable of str, optional
-        Inputs that must be unchanged since a job wrote them, and have its record; all
-        inputs by default.
+    check_inputs : bool, optional
+        Whether the inputs must be unchanged since a job wrote them, and have its
+        record.
     """
     log = snakemake.log[0]
     sys.excepthook = sys.__excepthook__
@@ -57,8 +57,9 @@ def run(
     try:
         with _shared_lock():
             started = _now()
+            sources = snakemake.params.get(SOURCE_FILES, ())
             digests, unrecorded = digest_inputs(
-                snakemake.input, None if checked is None else set(map(str, checked))
+                [*snakemake.input, *sources], None if check_inputs else sources
             )
             step(snakemake)
             write_records(_build_record(snakemake, started, digests, unrecorded))

@@ -14,5 +14,5 @@ def run_step(job: Job) -> None:
 run(
     run_step,
     snakemake,
-    snakemake.input.sources if snakemake.params.get("files_sha256") else None,
+    check_inputs=not snakemake.params.get("files_sha256"),
 )

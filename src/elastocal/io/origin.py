@@ -10,10 +10,13 @@ from typing import Any
 from elastocal import __version__
 from elastocal.io.plugins import list_plugin_versions
 
-# Parameters of rules that are no configuration: with one Snakemake notices edited
-# sources, the other is the function that a job calls.
+# Parameters of rules that are no configuration: the script of a job with the modules
+# that it imports, a digest by which Snakemake notices edits of them, and the function
+# that a job calls.
+SOURCE_FILES = "sources"
 SOURCES_DIGEST = "sources_sha256"
 STEP = "step"
+PARAMETERS_OF_EVERY_RULE = (SOURCE_FILES, SOURCES_DIGEST, STEP)
 # Pins of the packages that a run installs; a wheel has none.
 _LOCK = "requirements/run.lock"
 # Libraries on which numbers may depend; their versions are recorded also without pins.
@@ -84,7 +87,7 @@ def describe_provenance(settings: Any, **facts: Any) -> dict[str, Any]:
     named = {
         name: value
         for name, value in settings.items()
-        if name not in (SOURCES_DIGEST, STEP)
+        if name not in PARAMETERS_OF_EVERY_RULE
     }
     configuration = json.loads(json.dumps(named, sort_keys=True, default=list))
     text = json.dumps(configuration, sort_keys=True)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Protocol
 
-from elastocal.io.origin import SOURCES_DIGEST, STEP, describe_provenance
+from elastocal.io.origin import PARAMETERS_OF_EVERY_RULE, describe_provenance
 from elastocal.mechanics.robot import set_target_offset
 from elastocal.mechanics.robot_file import parse_robot
 from elastocal.study.strategies import strategy_from_document
@@ -95,7 +95,7 @@ def collect_settings(job: Job, *excluded: str) -> dict[str, Any]:
     return {
         name: value
         for name, value in job.params.items()
-        if name not in (STEP, SOURCES_DIGEST, *excluded)
+        if name not in (*PARAMETERS_OF_EVERY_RULE, *excluded)
     }
 
 
