@@ -363,7 +363,7 @@ def _format_gross_error(outcome: OutlierTest, campaign: Campaign, index: int) ->
         first = int(measurements.row[np.argmax(same_position)])
         cause = f", the same point as {campaign.locate_row(first)}"
     probability = outcome.probability[index]
-    doubt = ""
+    uncertainty = ""
     if probability < _OVERWHELMING:
-        doubt = f", wrong with a probability of {100 * probability:.0f} %"
-    return f"{line}: {size} off{cause}{doubt}, left out"
+        uncertainty = f", wrong with a probability of {100 * probability:.0f} %"
+    return f"{line}: {size} off{cause}{uncertainty}, left out"
