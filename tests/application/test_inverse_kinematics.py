@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from analysed_robots import analysed
+from scipy.interpolate import PchipInterpolator
 
+from elastocal.application import inverse_kinematics
 from elastocal.application.inverse_kinematics import (
     SOLVED_M,
     _find_least_motion,
@@ -92,3 +94,50 @@ def test_a_step_may_be_five_times_the_rotation_of_the_path_and_ten_degrees():
     wanted = compute_poses(robot.chain, angles, robot.chain.end_effector)
     allowed = compute_allowed_steps(robot, *wanted)
     np.testing.assert_allclose(np.degrees(allowed), 25.0)
+
+
+def interpolate_path(robot, count):
+    """Poses of a smooth path of the joints through six random postures."""
+    low, high = robot.joint_limits.T
+    shares = np.random.default_rng(3).uniform(0.2, 0.8, (6, robot.joints))
+    knots = PchipInterpolator(np.arange(6), low + (high - low) * shares)
+    angles = knots(np.linspace(0, 5, count))
+    return compute_poses(robot.chain, angles, robot.chain.end_effector)
+
+
+@pytest.mark.parametrize("name", ["kuka", "gp180"])
+def test_a_path_in_closed_form_is_no_longer_than_one_from_random_starts(
+    name, monkeypatch
+):
+    robot = analysed(name)
+    wanted = interpolate_path(robot, 60)
+    path, error_m = solve_path(robot, *wanted)
+    monkeypatch.setattr(inverse_kinematics, "find_spherical_wrist", lambda chain: None)
+    from_random_starts, _ = solve_path(robot, *wanted)
+    assert error_m.max() < SOLVED_M and not find_beyond_limits(robot, path).any()
+    allowed = compute_allowed_steps(robot, *wanted)
+    costs = [
+        compute_motion_cost(np.abs(np.diff(angles, axis=0)), allowed).sum()
+        for angles in (path, from_random_starts)
+    ]
+    assert costs[0] <= costs[1] + 1e-3
+
+
+def test_a_path_through_aligned_wrists_keeps_the_angles_of_its_neighbours():
+    """Joints 4 and 6 are on one line in the middle of the path, where infinitely many
+    angles reach the pose."""
+    robot = analysed("kuka")
+    angles = np.tile(robot.joint_limits.mean(axis=1) + BENT, (21, 1))
+    # The other side of the elbow, which is not aligned, is beyond the limits.
+    limits = robot.joint_limits.copy()
+    limits[2, 0] = 0.0
+    robot = replace(robot, joint_limits=limits)
+    angles[:, 3] = np.radians(50.0)
+    angles[:, 4] = np.radians(np.abs(np.linspace(-20.0, 20.0, 21)))
+    angles[8:13, 4] = 0.0
+    angles[8:13, 0] += np.radians([0.0, 0.5, 1.0, 0.5, 0.0])
+    wanted = compute_poses(robot.chain, angles, robot.chain.end_effector)
+    path, error_m = solve_path(robot, *wanted)
+    assert error_m.max() < SOLVED_M
+    steps = np.abs(np.diff(path, axis=0))
+    assert (steps <= compute_allowed_steps(robot, *wanted)).all()

@@ -26,8 +26,10 @@ from elastocal.application.calibrated import (
     split_into_chunks,
 )
 from elastocal.application.inverse_kinematics import (
+    SINGULAR_DETERMINANT,
     SOLVED_M,
     compute_allowed_steps,
+    compute_determinants,
     compute_reach_m,
     find_beyond_limits,
     solve_path,
@@ -59,9 +61,6 @@ _LARGEST_CORRECTION = 0.1
 # within this share of the reach. One stated posture can then stand for a stretch of a
 # path, while other postures differ by more or lie behind a singular one.
 _POSTURE_RAD = np.radians(45.0)
-# A posture counts as singular if the normalised determinant of its Jacobian is below
-# this value; the sign of the determinant then does not identify a posture.
-_SINGULAR_DETERMINANT = 1e-6
 
 
 @dataclass(frozen=True)
@@ -192,15 +191,10 @@ def _find_other_postures(
 
 
 def _find_side(robot: Robot, angles: np.ndarray) -> np.ndarray:
-    """Return the sign of the Jacobian's determinant at angles (N, 6), 0 if singular.
-
-    Angles count as lengths at the reach, in which the Jacobian is normalised.
-    """
-    scale = np.repeat([1.0 / compute_reach_m(robot), 1.0], 3)[:, None]
-    jacobian = compute_jacobians(robot.chain, angles, robot.chain.end_effector)
-    determinant = np.linalg.det(jacobian * scale)
-    is_singular = np.abs(determinant) < _SINGULAR_DETERMINANT
-    return np.where(is_singular, 0.0, np.sign(determinant))
+    """Return the sign of the Jacobian's determinant at angles (N, 6), 0 if singular."""
+    determinants = compute_determinants(robot, angles)
+    is_singular = np.abs(determinants) < SINGULAR_DETERMINANT
+    return np.where(is_singular, 0.0, np.sign(determinants))
 
 
 @dataclass(frozen=True)

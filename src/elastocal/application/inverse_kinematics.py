@@ -1,8 +1,10 @@
-"""Joint angles of the rigid robot for wanted poses, by damped least squares from several
-starts, and a path through them without jumps.
+"""Joint angles of the rigid robot for wanted poses, in closed form or by damped least
+squares from several starts, and a path through them without jumps.
 
-Each step is that of Levenberg and Marquardt [1] on the pose error, in which rotations
-count as lengths at the reach of the arm; it is batched over targets and starts. All
+An arm with a spherical wrist has eight postures in closed form, see `spherical_wrist`.
+For other arms each step is that of Levenberg and Marquardt [1] on the pose error, in
+which rotations count as lengths at the reach of the arm; it is batched over targets and
+starts. All
 solutions of all rows, and their copies whole turns away, are candidates for the path.
 Chosen is a path without large steps if there is one, and among these the path along
 which the joints move least, by dynamic programming (Viterbi's algorithm [2]).
@@ -15,12 +17,17 @@ Planning and Control, section 3.7, Springer, 2009.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.application.spherical_wrist import (
+    SphericalWristArm,
+    find_spherical_wrist,
+    solve_all_postures,
+)
 from elastocal.mechanics.kinematics import (
+    compute_jacobians,
     compute_pose_differences,
     compute_poses_and_jacobians,
 )
@@ -36,6 +43,10 @@ _ITERATIONS = 60
 _CONVERGED_M = 1e-10
 # Pose error above which a pose is out of reach.
 SOLVED_M = 1e-7
+# A posture of six joints counts as singular if the normalised determinant of its
+# Jacobian is below this value; the sign of the determinant then does not identify a
+# posture, and more than rounding of joint angles changes the pose by less than rounding.
+SINGULAR_DETERMINANT = 1e-6
 # Rounding errors of joint angles at their limits (rad, or m).
 _ROUNDING = 1e-9
 # Solutions that differ by less (rad, or m) are one.
@@ -66,6 +77,8 @@ _MOST_TURNS = 4
 # comes first, the distance from the middle of the limits last.
 _EXCESS_WEIGHT = 1e4
 _MIDDLE_WEIGHT = 1e-5
+# Rows of a path whose costs are in memory at once.
+_BLOCK = 512
 # Longest step of a joint in an iteration, rad or m; the linearization is valid for no
 # longer ones.
 _LONGEST_STEP = 0.5
@@ -229,7 +242,11 @@ def solve_path(
     -------
     angles, error_m : (N, n) and (N,) as in `solve_poses`.
     """
-    solutions = _solve_from_anchors(robot, position, rotation)
+    arm = find_spherical_wrist(robot.chain)
+    if arm is None:
+        solutions = _solve_from_anchors(robot, position, rotation)
+    else:
+        solutions = _solve_in_closed_form(robot, arm, position, rotation)
     path, path_error_m = _choose_path(robot, position, rotation, solutions)
     steps = np.abs(np.diff(path, axis=0))
     if (
@@ -239,17 +256,57 @@ def solve_path(
     ):
         return path, path_error_m
     # Continue the solutions from row to row in both directions. This finds postures that
-    # the starts of a row have missed, and nearby solutions of an arm with more joints
-    # than it needs.
+    # the starts of a row have missed, and nearby solutions where there are infinitely
+    # many: of a singular posture, or of an arm with more joints than it needs.
     rows = np.arange(len(position))
-    forward = _continue_solutions(robot, position, rotation, solutions, rows)
-    backward = _continue_solutions(robot, position, rotation, solutions, rows[::-1])
+    if arm is not None:
+        rows = np.flatnonzero(_find_singular(robot, solutions).any(axis=0))
+    if not len(rows):
+        return path, path_error_m
+    forward = _continue_solutions(
+        robot, position, rotation, solutions, rows[rows > 0], -1
+    )
+    backward = _continue_solutions(
+        robot, position, rotation, solutions, rows[rows < len(position) - 1][::-1], 1
+    )
     every = (solutions, forward, backward)
     extended = _Solutions(
         np.concatenate([candidates.angles for candidates in every]),
         np.concatenate([candidates.error_m for candidates in every]),
     )
     return _choose_path(robot, position, rotation, extended)
+
+
+def compute_determinants(robot: Robot, angles: np.ndarray) -> np.ndarray:
+    """Compute the determinants (...) of the Jacobian of six joints at angles (..., 6).
+
+    Angles count as lengths at the reach, in which the Jacobian is normalised.
+    """
+    scale = np.repeat([1.0 / compute_reach_m(robot), 1.0], 3)[:, None]
+    jacobian = compute_jacobians(robot.chain, angles, robot.chain.end_effector)
+    return np.asarray(np.linalg.det(jacobian * scale))
+
+
+def _find_singular(robot: Robot, solutions: _Solutions) -> np.ndarray:
+    """Find the solutions of an arm of six joints that are singular, (K, N) bool."""
+    is_singular = solutions.error_m <= SOLVED_M
+    determinants = compute_determinants(robot, solutions.angles[is_singular])
+    is_singular[is_singular] = np.abs(determinants) < SINGULAR_DETERMINANT
+    return is_singular
+
+
+def _solve_in_closed_form(
+    robot: Robot, arm: SphericalWristArm, position: np.ndarray, rotation: np.ndarray
+) -> _Solutions:
+    """Find all postures of each row; those that do not reach it have an infinite
+    error."""
+    angles, is_reached = solve_all_postures(arm, position, rotation)
+    error_m = np.full(is_reached.shape, np.inf)
+    _, row = np.nonzero(is_reached)
+    angles[is_reached], error_m[is_reached] = solve_poses(
+        robot, position[row], rotation[row], angles[is_reached]
+    )
+    return _Solutions(angles, error_m)
 
 
 def _solve_from_anchors(
@@ -304,11 +361,14 @@ def _continue_solutions(
     rotation: np.ndarray,
     solutions: _Solutions,
     rows: np.ndarray,
+    neighbour: int,
 ) -> _Solutions:
-    """Solve each row again, from the solutions of the row before it in `rows`."""
+    """Solve each of the rows again, from the solutions of the row before it (-1) or
+    behind it (1)."""
     angles = solutions.angles.copy()
     error_m = solutions.error_m.copy()
-    for previous, row in pairwise(rows):
+    for row in rows:
+        previous = row + neighbour
         starts = np.flatnonzero(error_m[:, previous] <= SOLVED_M)
         continued, continued_error_m = solve_poses(
             robot,
@@ -434,28 +494,42 @@ class _PathCandidates:
         return [copies.shape[-1] for copies in self.copies]
 
     def broadcast(self, values: np.ndarray, joint: int) -> np.ndarray:
-        """Reshape values (K, turns) of a joint for arrays (K, turns of all joints)."""
+        """Reshape values (..., turns) of a joint for arrays (..., turns of all
+        joints)."""
         shape = [1] * len(self.copies)
         shape[joint] = self.turns[joint]
-        return values.reshape(len(values), *shape)
+        return values.reshape(*values.shape[:-1], *shape)
 
-    def motion_cost(self, row: int, joint: int) -> np.ndarray:
-        """Cost of the steps of a joint to a row: (K, turns) of the row before by (K,
-        turns) of this row."""
-        copies = self.copies[joint]
-        step = np.abs(copies[:, row - 1, :, None, None] - copies[:, row])
-        excess = np.maximum(step - self.allowed[row - 1, joint], 0.0)
-        return step + _EXCESS_WEIGHT * excess
+    def split_rows(self) -> list[slice]:
+        """Split all rows but the first one into blocks."""
+        rows = self.exclusion.shape[1]
+        starts = range(1, rows, _BLOCK)
+        return [slice(start, min(start + _BLOCK, rows)) for start in starts]
 
-    def posture_cost(self, row: int) -> np.ndarray:
-        """Cost of each posture of a row, (K, turns of all joints)."""
-        cost = self.exclusion[:, row].reshape(-1, *[1] * len(self.copies))
+    def motion_costs(self, rows: slice) -> list[np.ndarray]:
+        """Costs of the steps of each joint to B rows, (B, K, K, turns, turns): postures
+        of the row before and of this row, and the turns of both."""
+        before = slice(rows.start - 1, rows.stop - 1)
+        costs = []
+        for joint, copies in enumerate(self.copies):
+            start = copies[:, before].transpose(1, 0, 2)[:, :, None, :, None]
+            end = copies[:, rows].transpose(1, 0, 2)[:, None, :, None, :]
+            step = np.abs(start - end)
+            allowed = self.allowed[before, joint].reshape(-1, 1, 1, 1, 1)
+            excess = np.maximum(step - allowed, 0.0)
+            costs.append(step + _EXCESS_WEIGHT * excess)
+        return costs
+
+    def posture_costs(self, rows: slice) -> np.ndarray:
+        """Costs of the postures of B rows, (B, K, turns of all joints)."""
+        exclusion = self.exclusion[:, rows].T
+        costs = exclusion.reshape(*exclusion.shape, *[1] * len(self.copies))
         for joint, (low, high) in enumerate(self.limits):
-            angle = self.copies[joint][:, row]
-            distance = _MIDDLE_WEIGHT * np.abs(angle - 0.5 * (low + high))
-            joint_cost = np.where(angle > high + _ROUNDING, np.inf, distance)
-            cost = cost + self.broadcast(joint_cost, joint)
-        return cost
+            angles = self.copies[joint][:, rows].transpose(1, 0, 2)
+            distance = _MIDDLE_WEIGHT * np.abs(angles - 0.5 * (low + high))
+            joint_costs = np.where(angles > high + _ROUNDING, np.inf, distance)
+            costs = costs + self.broadcast(joint_costs, joint)
+        return costs
 
 
 def _find_least_motion(candidates: _PathCandidates) -> np.ndarray:
@@ -470,35 +544,44 @@ def _find_least_motion(candidates: _PathCandidates) -> np.ndarray:
     (N, n) angles of the chain, rad.
     """
     totals = _accumulate_costs(candidates)
-    joints = range(len(candidates.copies))
-    path = np.empty((len(totals), len(candidates.copies)))
-    total = totals[-1]
-    for row in range(len(path) - 1, -1, -1):
-        posture, *turns = np.unravel_index(np.argmin(total), total.shape)
-        for joint in joints:
-            path[row, joint] = candidates.copies[joint][posture, row, turns[joint]]
-        if row:
+    # The posture of each row, and the turn of each joint.
+    states = np.empty((len(totals), 1 + len(candidates.copies)), int)
+    states[-1] = np.unravel_index(np.argmin(totals[-1]), totals[-1].shape)
+    for rows in reversed(candidates.split_rows()):
+        motion = candidates.motion_costs(rows)
+        for row in range(rows.stop - 1, rows.start - 1, -1):
+            posture, *turns = states[row]
             total = totals[row - 1]
-            for joint in joints:
-                cost = candidates.motion_cost(row, joint)[:, :, posture, turns[joint]]
+            for joint, turn in enumerate(turns):
+                cost = motion[joint][row - rows.start, :, posture, :, turn]
                 total = total + candidates.broadcast(cost, joint)
-    return path
+            states[row - 1] = np.unravel_index(np.argmin(total), total.shape)
+    posture, *turns = states.T
+    rows = np.arange(len(states))
+    angles = [
+        copies[posture, rows, turn]
+        for copies, turn in zip(candidates.copies, turns, strict=True)
+    ]
+    return np.stack(angles, axis=1)
 
 
 def _accumulate_costs(candidates: _PathCandidates) -> list[np.ndarray]:
     """Accumulate the least cost of a path from the first row to each posture of each
     row, (K, turns of all joints)."""
-    count, rows = candidates.exclusion.shape
     joints = len(candidates.copies)
-    totals = [candidates.posture_cost(0)]
-    for row in range(1, rows):
-        # Axes: K of the row before, K, turns of all joints. The first of the turns
+    totals = [candidates.posture_costs(slice(0, 1))[0]]
+    for rows in candidates.split_rows():
+        posture_costs = candidates.posture_costs(rows)
+        # Axes: rows, K of the row before, K, turns of all joints. The first of the turns
         # belongs to the row before; minimising over it appends that of this row, so
         # after all joints the turns are those of this row.
-        cost = np.broadcast_to(totals[-1][:, None], (count, count, *candidates.turns))
-        for joint in range(joints):
-            motion = candidates.motion_cost(row, joint).transpose(0, 2, 1, 3)
-            motion = np.expand_dims(motion, tuple(range(3, joints + 2)))
-            cost = (cost[..., None] + motion).min(axis=2)
-        totals.append(cost.min(axis=0) + candidates.posture_cost(row))
+        motion_costs = [
+            np.expand_dims(costs, tuple(range(4, joints + 3)))
+            for costs in candidates.motion_costs(rows)
+        ]
+        for row, posture_cost in enumerate(posture_costs):
+            cost = totals[-1][:, None]
+            for motion_cost in motion_costs:
+                cost = (cost[..., None] + motion_cost[row]).min(axis=2)
+            totals.append(cost.min(axis=0) + posture_cost)
     return totals
