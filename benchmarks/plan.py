@@ -119,12 +119,12 @@ def _plan(folder: Path, target: str, levels: int) -> Plan:
         stderr=subprocess.STDOUT,
         text=True,
     )
-    said = process.stdout.read() if process.stdout else ""
+    printed = process.stdout.read() if process.stdout else ""
     # The usage of this process alone; that of all ended processes has the largest peak.
     _, status, usage = os.wait4(process.pid, 0)
-    total = re.search(r"^total +(\d+)$", said, re.MULTILINE)
+    total = re.search(r"^total +(\d+)$", printed, re.MULTILINE)
     if status or total is None:
-        sys.exit(f"{said}\nfailed: {' '.join(command)} in {folder}")
+        sys.exit(f"{printed}\nfailed: {' '.join(command)} in {folder}")
     seconds = usage.ru_utime + usage.ru_stime
     return Plan(int(total[1]), seconds, usage.ru_maxrss * 1024 / 1e6)
 
