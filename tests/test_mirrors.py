@@ -39,6 +39,8 @@ def test_every_module_has_a_test_file_of_its_name(module):
 @pytest.mark.parametrize(
     "path", [path for top in SOURCES for path in top.rglob("__init__.py")], ids=str
 )
-def test_an_init_file_defines_nothing_because_it_has_no_test_file(path):
+def test_an_init_file_defines_nothing_unless_it_has_a_test_file(path):
+    """Only the top of the package has one: it imports its public names on first use."""
     text = path.read_text(encoding="utf-8")
-    assert "\ndef " not in text and "\nclass " not in text
+    has_tests = path.parent == SOURCES[0] and (TESTS / "test___init__.py").is_file()
+    assert has_tests or ("\ndef " not in text and "\nclass " not in text)
