@@ -47,7 +47,8 @@ onstart:
 
 
 onsuccess:
-    for line in describe_outcome(snakemake_internals.files_of_jobs(workflow)):
+    made = snakemake_internals.files_of_jobs(workflow)
+    for line in describe_outcome(made, folder=config.get("campaign") or "CAMPAIGN"):
         logger.info(line)
 
 

@@ -54,10 +54,11 @@ def test_a_certificate_states_the_errors_of_the_campaign(elastocal, in_checkout)
     assert result.exit_code == 0, result.output
     assert CERTIFICATE.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
     assert document["conformity"]["tolerance_m"] == 5e-4
-    decision, sentences, point, pages = result.output.splitlines()[:4]
+    decision, sentences, _, point, pages, _, following = result.output.splitlines()
     assert document["conformity"]["decision"] in decision and "0.500 mm" in decision
     assert "Nobody has measured" in sentences
     assert document["point"] in point and pages.endswith(".pdf")
+    assert following.startswith("next: elastocal verify ")
     measured_and_predicted = tabulate_errors(read_verdict(VERDICT))
     assert document["errors"] == measured_and_predicted
     measured, predicted = measured_and_predicted

@@ -154,6 +154,29 @@ def test_a_tracker_without_joint_angles_fills_the_planned_sheet(
         assert second.startswith("2,0,0,smr,2.0,1.204")
 
 
+def test_files_of_several_sessions_are_imported_at_once(elastocal, tmp_path, sheet):
+    header, *rows = TRACKER.splitlines()
+    files = []
+    for number, row in enumerate(rows):
+        files.append(tmp_path / f"session{number}.csv")
+        files[-1].write_text(f"{header}\n{row}\n")
+    folder = ("--folder", tmp_path / "cell", "--column", "pose=Name")
+    result = elastocal("import", "csv", *files, *folder)
+    assert result.exit_code == 0, result.exception
+    header, first, second = sheet.read_text().splitlines()
+    assert header.startswith("session,pose")
+    assert first.startswith("0,1,0,0,smr") and second.startswith("1,2,0,0,smr")
+
+
+def test_an_import_names_the_next_command(elastocal, tmp_path, sheet):
+    tracker = tmp_path / "tracker.csv"
+    tracker.write_text(TRACKER)
+    command = ("import", "csv", tracker, "--folder", tmp_path / "cell")
+    result = elastocal(*command, "--join", "order")
+    # Without a campaign.yaml the campaign is begun first.
+    assert f"next: elastocal init {tmp_path / 'cell'} --robot" in result.output
+
+
 def test_joint_angles_come_from_a_file_of_their_own(elastocal, refusal, tmp_path):
     joints = tmp_path / "joints.csv"
     joints.write_text("Nr,J1\n1,10\n2,20\n")

@@ -51,7 +51,7 @@ def test_a_plan_is_a_folder_to_fill_in_with_its_pages(
     cell = ("--tracker", "3,1,1", "--box=-3,3,-3,3,-2,-0.5", "--base-known")
     answer, document, sheet = plan(*load, *cell, "--target", "6DoF=0,0,0")
     assert "18 poses to fit and 4 held out" in answer
-    assert "next: measure, fill in" in answer
+    assert "next: measure, then elastocal import csv tracker.csv" in answer
     assert {path.name for path in (tmp_path / "cell").iterdir()} == FILES
     assert document["holdout"] == {"poses": [19, 20, 21, 22]}
     assert document["frame"] == "base"

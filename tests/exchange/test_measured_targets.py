@@ -72,6 +72,20 @@ def test_tables_of_other_programs_are_read_with_their_units(paths, read):
     np.testing.assert_allclose(read(lengths="mm").position, 1e-3 * position)
 
 
+def test_names_of_targets_and_times_of_day_are_read_as_a_tracker_writes_them(
+    paths, read
+):
+    table = write_targets(paths[0])
+    names = [f"P{number:03}" for number in range(2, 11)]
+    clock = [f"15:00:{second:02}" for second in range(9)]
+    write_measured(paths[1], table[1:], pose=names, time=clock)
+    measured = read()
+    np.testing.assert_array_equal(measured.row, np.arange(1, 10))
+    assert measured.conditions["time_s"][:2].tolist() == [54000.0, 54001.0]
+    write_measured(paths[1], table[1:], pose=names, time="after lunch")
+    assert not read().conditions
+
+
 def test_repeats_are_counted_and_reflectors_told_apart(paths, read):
     table = write_targets(paths[0])
     twice = table.loc[np.repeat(np.arange(10), 2)]

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 from analysed_robots import ROBOTS, analysed
@@ -28,10 +29,16 @@ def refuse(function, **options):
 
 @pytest.fixture
 def join(tmp_path):
-    """Joins measurements at ten targets to a campaign with these changes."""
+    """Joins measurements at ten targets to a campaign with these changes, whose poses
+    from `afternoon` on are a session of their own."""
 
-    def make_and_join(columns=None, **changes):
+    def make_and_join(columns=None, afternoon=None, **changes):
         make_folder(tmp_path / "cell", analysed("kuka"), "cell", **changes)
+        if afternoon is not None:
+            path = tmp_path / "cell" / "measurements.csv"
+            sheet = pd.read_csv(path)
+            sheet["session"] = (sheet["pose"] >= afternoon).astype(int)
+            sheet.to_csv(path, index=False)
         folder = read_campaign_folder(tmp_path / "cell", ROBOTS)
         table = write_targets(tmp_path / "targets.csv")
         write_measured(tmp_path / "measured.csv", table, **(columns or {}))
@@ -68,6 +75,11 @@ def test_a_round_has_both_sessions_with_their_loads(join):
 def test_held_out_poses_keep_their_session(join):
     *_, joined, _, _ = join(holdout={"poses": [1, 3]})
     assert joined.holdout == {"poses": [[0, 1], [0, 3]]}
+
+
+def test_held_out_poses_of_several_sessions_keep_theirs(join):
+    *_, joined, _, _ = join(holdout={"poses": [1, 3]}, afternoon=2)
+    assert joined.holdout == {"poses": [[0, 1], [1, 3]]}
 
 
 def test_a_robot_in_the_folder_goes_with_it(join, tmp_path):

@@ -17,7 +17,7 @@ def test_the_outcome_names_reports_and_verdicts(tmp_path):
     lines = {}
     for name in ("not_testable", "named"):
         write_verdict(folder / "verdict.json", CAMPAIGNS[name])
-        lines[name] = describe_outcome(files, tmp_path)
+        lines[name] = describe_outcome(files, tmp_path, "my cells/cell7")
     verdict_line, errors, *following_lines = lines["not_testable"]
     assert verdict_line.startswith(
         "! cell7: Whatever a mechanism of the catalogue would contribute"
@@ -35,5 +35,5 @@ def test_the_outcome_names_reports_and_verdicts(tmp_path):
         "✓ cell7: The declared model lacks one mechanism"
     )
     assert lines["named"][-1] == (
-        "next: elastocal correct, elastocal certificate, elastocal verify"
+        "next: elastocal correct 'my cells/cell7' path.csv --output targets.csv"
     )

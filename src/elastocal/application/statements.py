@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 from elastocal.application.frames import FRAMES, ROBOT
 from elastocal.counting import format_count
+from elastocal.effects.catalogue import list_effects
+from elastocal.effects.protocol import effect_of
 
 if TYPE_CHECKING:
     from elastocal.verdict import Accuracy, Verdict
@@ -34,7 +36,8 @@ def format_accuracy(accuracy: Accuracy) -> str:
         " the tracker's noise is not in it."
     )
     if accuracy.left_out:
-        names = ", ".join(accuracy.left_out)
+        effects = list_effects()
+        names = ", ".join(effects[effect_of(key)].words for key in accuracy.left_out)
         size = format_millimetres(accuracy.left_out_m)
         text += f" {size} of it stand for {names}, which no command contains."
     # Do not mention a contribution that rounds to nothing.

@@ -24,6 +24,7 @@ from elastocal.command.terminal import (
     TargetsOption,
     find_robots_folder,
     find_workplace,
+    format_command,
     print_answer,
     print_lines,
     refuse_taken_name,
@@ -130,7 +131,7 @@ def check(folder: Annotated[Path, Argument(help="Folder of the campaign.")]) -> 
         answer = f"{report.campaign} can be diagnosed: {testable} can be tested"
         if report.attention:
             answer += f"; {format_count(len(report.attention), 'remark')} below"
-        next_step = f"elastocal diagnose {folder}"
+        next_step = format_command("diagnose", folder)
     else:
         answer = f"{report.campaign} cannot be diagnosed: the data are at fault"
         next_step = "mend the data, then check again"
@@ -291,5 +292,6 @@ def _print_outcome(folder: Path, workplace: Path, console: Console) -> None:
 
     name = read_campaign_folder(folder, find_robots_folder()).name
     print_lines(
-        describe_outcome([f"reports/loop/{name}/report.pdf"], workplace), console
+        describe_outcome([f"reports/loop/{name}/report.pdf"], workplace, folder),
+        console,
     )

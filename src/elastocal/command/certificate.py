@@ -11,6 +11,7 @@ from typer import Argument, Option
 
 from elastocal.command.terminal import (
     find_workplace,
+    format_command,
     load_diagnosed_campaign,
     parse_length_m,
     print_answer,
@@ -65,17 +66,22 @@ def certificate(
         facts = collect_certificate_facts(document)
         _write_certificate(report, document, facts)
     passed = facts["decision"] == "pass"
+    rms_m = document["validation_rms_m"]
+    next_step = ""
+    if rms_m["corrected"] < rms_m["before"]:
+        next_step = format_command("verify", folder, "measured.csv")
     warnings = [f"! {error['sentence']}" for error in document["misplaced"]]
     print_answer(
         f"{facts['decision']}, as predicted: {facts['headline']}",
         [
             facts["decision_sentences"],
+            facts["now"],
             facts["point"],
             *warnings,
             str(report / PAGES),
             str(report / DOCUMENT),
         ],
-        facts["now"],
+        next_step,
         console,
         passed=passed,
     )

@@ -18,6 +18,7 @@ from elastocal.command.terminal import (
     RotationOption,
     UnitOption,
     find_workplace,
+    format_command,
     load_diagnosed_campaign,
     parse_pairs,
     parse_units,
@@ -156,7 +157,7 @@ def correct(
     print_answer(
         f"{corrected.share} corrected",
         details,
-        f"elastocal certificate {folder} --tolerance 0.2mm",
+        format_command("certificate", folder, "--tolerance", "0.2mm"),
         console,
         passed=is_complete,
     )

@@ -129,6 +129,7 @@ def _describe_losses(
 
     from elastocal.application.calibrated import predict_residual_displacements
     from elastocal.application.exported import compute_left_out_displacements_m
+    from elastocal.report.words import format_candidate, join_items
 
     warnings = []
     calibrated = campaign.calibrated
@@ -144,7 +145,9 @@ def _describe_losses(
         )
     if folded.left_out:
         effects = exported.model.effects
-        names = ", ".join(effects[number].key for number in folded.left_out)
+        names = join_items(
+            format_candidate(effects[number].key) for number in folded.left_out
+        )
         size = _format_size(
             compute_left_out_displacements_m(exported, reported_angles, wrench)
         )

@@ -19,6 +19,7 @@ from elastocal.command.terminal import (
     RotationOption,
     UnitOption,
     find_robots_folder,
+    format_command,
     format_example,
     parse_pairs,
     parse_units,
@@ -136,8 +137,12 @@ def dh(
     )
 )
 def csv(
-    file: Annotated[
-        Path, Argument(help="The table: CSV, tabs, semicolons, spaces, .xlsx, .mat.")
+    files: Annotated[
+        list[Path],
+        Argument(
+            help="The table: CSV, tabs, semicolons, spaces, .xlsx, .mat; of several each"
+            " is a session, before which the tracker may have been moved."
+        ),
     ],
     *,
     folder: Annotated[
@@ -219,11 +224,8 @@ def csv(
 
     from elastocal.campaigns.measurements import CSV, write_measurements
     from elastocal.campaigns.reading import read_robot
-    from elastocal.exchange.measurement_table import (
-        ImportOptions,
-        OtherFile,
-        read_measurement_table,
-    )
+    from elastocal.exchange.measurement_table import ImportOptions, OtherFile
+    from elastocal.exchange.sessions import read_sessions
     from elastocal.io.atomic_writes import write_together
 
     _check_replaceable(folder, force=force)
@@ -246,8 +248,8 @@ def csv(
     )
     declared_targets, declared_robot = _read_declared(folder)
     robot_file = robot or declared_robot
-    imported = read_measurement_table(
-        file,
+    imported = read_sessions(
+        files,
         options,
         read_robot(robot_file) if robot_file else None,
         OtherFile(joints) if joints else _find_sheet(folder),
@@ -261,7 +263,11 @@ def csv(
             f"! campaign.yaml there has no target {', '.join(unknown)}:"
             " name it there, or in place of one of its own"
         )
-    print_lines(lines, Console())
+    next_step = format_command("check", folder)
+    if not declared_targets:
+        robot_file = robot_file or Path("robot.yaml")
+        next_step = format_command("init", folder, "--robot", robot_file)
+    print_lines([*lines, f"next: {next_step}"], Console())
 
 
 def _write_robot(result: ImportedRobot, output: Path) -> None:
@@ -271,7 +277,9 @@ def _write_robot(result: ImportedRobot, output: Path) -> None:
     from elastocal.exchange.robot_text import summarize_import, write_robot
 
     write_robot(result, output)
-    print_lines([*summarize_import(result), f"written: {output.as_posix()}"], Console())
+    next_step = format_command("plan", output, "--folder", "campaigns/cell")
+    lines = [f"written: {output.as_posix()}", f"next: {next_step}"]
+    print_lines([*summarize_import(result), *lines], Console())
 
 
 def _check_replaceable(folder: Path, *, force: bool) -> None:

@@ -15,6 +15,7 @@ from elastocal.command.terminal import (
     LARGEST_SEED,
     MOST_POSES,
     MOST_ROWS,
+    format_command,
     parse_angle_rad,
     parse_length_m,
     parse_numbers,
@@ -142,7 +143,6 @@ def plan(
     from elastocal.application.planning.plan import choose_plan, find_allowed_candidates
     from elastocal.application.planning.survey import Survey
     from elastocal.application.pose_counts import warn_of_few_poses
-    from elastocal.campaigns.measurements import CSV
     from elastocal.campaigns.reading import read_robot
 
     arm = read_robot(robot)
@@ -185,7 +185,8 @@ def plan(
             *(f"! {warning}" for warning in warnings),
             f"sheet to print: {folder / SHEET}",
         ],
-        f"measure, fill in {folder / CSV}, then elastocal check {folder}",
+        "measure, then"
+        f" {format_command('import', 'csv', 'tracker.csv', '--folder', folder)}",
         console,
     )
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 import re
+import shlex
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -178,6 +179,11 @@ def format_example(command: str) -> str:
     wrapped."""
     # \b keeps click from joining the lines of a paragraph.
     return f"\b\nExample:\n  {command}"
+
+
+def format_command(*words: str | Path) -> str:
+    """Format a command of elastocal so that a shell takes it as it is printed."""
+    return shlex.join(["elastocal", *map(str, words)])
 
 
 def print_answer(

@@ -16,6 +16,7 @@ from elastocal.command.terminal import (
     LengthsOption,
     TargetsOption,
     find_workplace,
+    format_command,
     load_diagnosed_campaign,
     parse_length_m,
     print_answer,
@@ -100,9 +101,7 @@ def verify(
     passed = facts["passed"]
     next_step = facts["now"]
     if verified.document["remaining"]["remains"]:
-        next_step = f"elastocal diagnose {folder} --with {measured}"
-        if targets is not None:
-            next_step += f" --targets {targets}"
+        next_step = _format_next_round(folder, measured, targets, lengths)
     print_answer(
         facts["headline"],
         [
@@ -117,6 +116,18 @@ def verify(
         passed=passed,
     )
     raise typer.Exit(0 if passed else 1)
+
+
+def _format_next_round(
+    folder: Path, measured: Path, targets: Path | None, lengths: str | None
+) -> str:
+    """Format the command that diagnoses again with these measurements."""
+    words: list[str | Path] = ["diagnose", folder, "--with", measured]
+    if targets:
+        words += ["--targets", targets]
+    if lengths:
+        words += ["--lengths", lengths]
+    return format_command(*words)
 
 
 def _read_certified_tolerance(report: Path) -> float | None:

@@ -132,7 +132,7 @@ def _read_keys(
 ) -> dict[str, list[str]]:
     """Read those of the `KEYS` that a table has, by name; `columns`: its headers."""
     names = [name for name in KEYS if name in columns]
-    return {name: _read_key(text, name, columns[name], notes) for name in names}
+    return {name: read_key(text, name, columns[name], notes) for name in names}
 
 
 def _unstated_order_error(measured: _Rows, planned: _Rows, shown: str) -> InputError:
@@ -247,7 +247,7 @@ def _read_label(text: TextTable, header: str) -> list[str]:
     return labels
 
 
-def _read_key(text: TextTable, name: str, header: str, notes: list[str]) -> list[str]:
+def read_key(text: TextTable, name: str, header: str, notes: list[str]) -> list[str]:
     """Read the numbers of poses, loads and repeats, or the names of targets. A label
     such as P12 stands for the number in it, and `notes` gets a sentence about it."""
     cells = [cell.strip() for cell in text.columns[header]]
@@ -341,6 +341,20 @@ def _refuse_missing(
             f" ({format_count(len(missing), 'row')} without one)",
             "a row for each, or --skip-empty to leave such rows out",
         )
+
+
+def refuse_unmeasured_rows(
+    sheet: TextTable, table: Mapping[str, np.ndarray], source: str
+) -> None:
+    """Refuse a planned sheet of which the joined `table` of some files has not all
+    rows; `source` names the files."""
+    planned = _collect_rows(
+        sheet, _read_keys(sheet, {name: name for name in KEYS}, []), KEYS
+    )
+    columns = [map(str, table[name].tolist()) for name in KEYS]
+    measured = {*zip(*columns, strict=True)}
+    rows = [row for row, key in enumerate(planned.keys) if key in measured]
+    _refuse_missing(planned, rows, source, skip_empty=False)
 
 
 def _show_pairs(measured: _Rows, planned: _Rows, pairs: Sequence[int]) -> str:

@@ -10,6 +10,7 @@ Lengths are metres and angles rad unless the header or an option states another 
 from __future__ import annotations
 
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -30,6 +31,7 @@ from elastocal.exchange.column_names import (
     find_scales,
     find_units,
 )
+from elastocal.exchange.joining import read_key
 from elastocal.exchange.pose_table import (
     PoseTable,
     TableOptions,
@@ -37,6 +39,7 @@ from elastocal.exchange.pose_table import (
     read_rotation_vectors,
 )
 from elastocal.exchange.target_path import NO_BOUND, OK
+from elastocal.exchange.times import read_times
 from elastocal.mechanics.components import WRENCH_NAMES
 
 if TYPE_CHECKING:
@@ -215,8 +218,7 @@ def read_target_measurements(
     angles = [f"q{joint}" for joint in range(1, robot.joints + 1)]
     if not all(name in columns for name in angles):
         angles = []
-    conditions = [name for name in _CONDITIONS if name in columns]
-    wanted = [*POSITION, *table.orientation, *conditions, *angles]
+    wanted = [*POSITION, *table.orientation, *angles]
     usual_units = {"lengths": lengths, "angles": "rad"}
     units = find_units(text, columns, wanted, stated_units, usual_units, robot)
     cells = text.cells(columns, find_scales(units))
@@ -236,8 +238,25 @@ def read_target_measurements(
         names,
         position,
         None if notation == NO_ROTATION else read_rotation_vectors(cells, table),
-        {name: cells.numbers(name) for name in conditions},
+        _read_conditions(text, columns, stated_units),
     )
+
+
+def _read_conditions(
+    text: TextTable, columns: dict[str, str], stated_units: dict[str, str]
+) -> dict[str, np.ndarray]:
+    """Read time and temperature. Only further rounds use them, so a column that holds
+    something else is left out."""
+    conditions = {}
+    for name in _CONDITIONS:
+        if name not in columns:
+            continue
+        with suppress(InputError):
+            units = find_units(text, columns, [name], stated_units, {})
+            cells = text.cells({name: columns[name]}, find_scales(units))
+            is_time = name == "time_s"
+            conditions[name] = read_times(cells) if is_time else cells.numbers(name)
+    return conditions
 
 
 def _refuse_other_angles(
@@ -295,7 +314,7 @@ def _assign_rows(
     count = len(targets)
     if "pose" in columns:
         cells = text.cells({"pose": columns["pose"]}, {})
-        pose = cells.integers("pose")
+        pose = np.array([*map(int, read_key(text, "pose", columns["pose"], []))])
         allowed = f"1 to {count}: the row of the target, without the header"
         cells.refuse((pose < 1) | (pose > count), ["pose"], allowed)
         cells.refuse(~targets.usable[pose - 1], ["pose"], "a target that was corrected")

@@ -51,7 +51,7 @@ _EMPTY = re.compile(
     r"|[+-]?nan(\(\w+\))?|[-–—]+|#?n/?a|n\.a\.|null|none", re.IGNORECASE
 )
 # Columns that a campaign can do without.
-_OPTIONAL = ("time_s", "temperature_c", "u95_m")
+CONDITIONS = ("time_s", "temperature_c", "u95_m")
 _Value = TypeVar("_Value")
 
 
@@ -118,10 +118,12 @@ class OtherFile:
     path : file with the joint angles.
     is_sheet : whether it is a sheet of `elastocal plan`, with names and units of
         measurements.csv; it counts only if the positions come without joint angles.
+    is_partial : whether it may have rows without a position, which are left out.
     """
 
     path: Path
     is_sheet: bool = False
+    is_partial: bool = False
 
 
 @dataclass(frozen=True)
@@ -237,10 +239,12 @@ def _read_source(
     source = _Source(text, headers, {}, notes)
     if joint_file is None:
         return source
+    skip_empty = options.skip_empty or joint_file.is_partial
     if joint_file.is_sheet:
+        options = replace(options, skip_empty=skip_empty)
         return _join_sheet(source, options, robot, joint_file.path)
     joints = _read_joint_file(joint_file.path, options)
-    joined = join_files(text, joints, options.join, skip_empty=options.skip_empty)
+    joined = join_files(text, joints, options.join, skip_empty=skip_empty)
     text = _leave_out(joined.text, options.ignore)
     return _Source(text, headers, {}, notes + joined.notes)
 
@@ -517,7 +521,7 @@ def _read_optional_columns(
     option asks for it. `headers`: those that options state, by name.
     """
     optional = _OptionalColumns({}, {}, [])
-    for name in _OPTIONAL:
+    for name in CONDITIONS:
         if name not in layout.columns:
             continue
         header = layout.columns[name]

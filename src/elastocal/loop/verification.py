@@ -25,7 +25,7 @@ from elastocal.application.verification import (
     predict_over_targets,
 )
 from elastocal.campaigns.campaign import DOCUMENT, average_by_group
-from elastocal.campaigns.holdout import number_configurations
+from elastocal.campaigns.holdout import list_poses, number_configurations
 from elastocal.campaigns.measurements import (
     CSV,
     ROTATION,
@@ -349,7 +349,8 @@ def _remark_on_frame(
         return []
     return [
         f"after the best placement of the base {1e3 * placed_m:.3f} mm of the measured"
-        f" {1e3 * rms_m:.3f} mm are left: the tracker's frame is not that of the campaign"
+        f" {1e3 * rms_m:.3f} mm are left: the tracker's frame is not that of the campaign,"
+        " or the diagnosis has placed the base inexactly"
     ]
 
 
@@ -510,13 +511,14 @@ def _number_held_out_poses(
     holdout: dict[str, Any], before: Measurements
 ) -> dict[str, Any]:
     """Return the rule of the held-out poses for a campaign with one more session: poses
-    that it names get their session."""
+    that it names get each session in which they were measured."""
     if "poses" not in holdout:
         return holdout
-    session = int(before.session.min())
-    return {
-        "poses": [
-            pose if isinstance(pose, list) else [session, pose]
-            for pose in holdout["poses"]
-        ]
-    }
+    labels, _ = list_poses(before)
+    poses = []
+    for entry in holdout["poses"]:
+        if isinstance(entry, list):
+            poses.append(entry)
+        else:
+            poses += labels[labels[:, 1] == entry].tolist()
+    return {"poses": poses}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,7 +25,9 @@ _REPORTS = {
 }
 
 
-def describe_outcome(made: Iterable[str], workplace: str | Path = "") -> list[str]:
+def describe_outcome(
+    made: Iterable[str], workplace: str | Path = "", folder: str | Path = "CAMPAIGN"
+) -> list[str]:
     """Return lines about the reports among the files that a run has made.
 
     Parameters
@@ -33,6 +36,8 @@ def describe_outcome(made: Iterable[str], workplace: str | Path = "") -> list[st
         Files, relative to the workplace.
     workplace : str or path
         Folder of the run.
+    folder : str or path
+        Folder of the campaign, for the next command.
     """
     lines = []
     advice = []
@@ -43,7 +48,7 @@ def describe_outcome(made: Iterable[str], workplace: str | Path = "") -> list[st
         if match:
             verdict = read_verdict(Path(workplace, path).with_name("verdict.json"))
             lines += [*describe_verdict(match[1], verdict), f"  report: {path}"]
-            advice.append(_advise(verdict))
+            advice.append(_advise(verdict, folder))
     # With several campaigns, each report has its own advice.
     return lines + advice if len(advice) == 1 else lines
 
@@ -66,9 +71,10 @@ def describe_verdict(name: str, verdict: Verdict) -> list[str]:
     ]
 
 
-def _advise(verdict: Verdict) -> str:
+def _advise(verdict: Verdict, folder: str | Path) -> str:
     if _is_correctable(verdict):
-        return "next: elastocal correct, elastocal certificate, elastocal verify"
+        words = ["correct", str(folder), "path.csv", "--output", "targets.csv"]
+        return f"next: elastocal {shlex.join(words)}"
     return 'next: "What to do now" on the first page of the report'
 
 
