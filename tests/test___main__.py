@@ -29,11 +29,21 @@ def test_a_terminal_that_lacks_a_character_gets_a_question_mark(tmp_path):
     assert b"Zelle-?" in finished.stderr and b"Traceback" not in finished.stderr
 
 
+def heed_interrupts():
+    """Heed interrupts in a new process, also if the tests run in the background, where
+    a shell has them ignored."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @pytest.mark.parametrize("delay_s", [0.15, 0.4, 1.0])
 def test_an_interrupt_ends_without_a_traceback(tmp_path, delay_s):
     """Also during the imports, which take most of the first second."""
     with subprocess.Popen(
-        [*COMMAND, "demo"], cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE
+        [*COMMAND, "demo"],
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        preexec_fn=heed_interrupts,
     ) as process:
         time.sleep(delay_s)
         process.send_signal(signal.SIGINT)
@@ -63,7 +73,11 @@ entry.main()
 def test_an_interrupt_that_a_library_takes_for_a_fault_is_an_interrupt():
     """Modules in C turn one during their import into an ImportError."""
     finished = subprocess.run(
-        [sys.executable, "-c", _MISLED_LIBRARY], capture_output=True, check=False
+        [sys.executable, "-c", _MISLED_LIBRARY],
+        capture_output=True,
+        check=False,
+        timeout=60,
+        preexec_fn=heed_interrupts,
     )
     assert finished.returncode == 130
     assert finished.stderr == b""
