@@ -7,6 +7,7 @@ import sys
 import time
 
 import pytest
+from support import heed_interrupts
 
 from elastocal.__main__ import _THREAD_VARIABLES
 
@@ -27,12 +28,6 @@ def test_a_terminal_that_lacks_a_character_gets_a_question_mark(tmp_path):
     finished = run_command("check", f"{tmp_path}/Zelle-ä", PYTHONIOENCODING="ascii")
     assert finished.returncode == 1
     assert b"Zelle-?" in finished.stderr and b"Traceback" not in finished.stderr
-
-
-def heed_interrupts():
-    """Heed interrupts in a new process, also if the tests run in the background, where
-    a shell has them ignored."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 @pytest.mark.parametrize("delay_s", [0.15, 0.4, 1.0])

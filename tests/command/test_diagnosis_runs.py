@@ -10,6 +10,7 @@ import pytest
 from analysed_robots import analysed
 from made_folders import make_folder
 from made_loop_tables import CAMPAIGNS
+from support import heed_interrupts
 
 from elastocal.command import campaign, diagnosis_runs
 from elastocal.verdict import write_verdict
@@ -139,7 +140,9 @@ diagnosis_runs.diagnose_folders([*map(Path, sys.argv[2:])], 1, Console(stderr=Tr
 def test_an_interrupt_begins_no_further_campaign(begin, tmp_path):
     folders, _ = begin(3)
     command = [sys.orig_argv[0], "-c", INTERRUPTED, tmp_path, *folders]
-    process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(
+        command, stderr=subprocess.DEVNULL, preexec_fn=heed_interrupts
+    )
     while not (tmp_path / "noted").exists():
         assert process.poll() is None
         time.sleep(0.1)

@@ -1,6 +1,7 @@
 """Helpers of several test files: the check of a refusal, chains in one line, and models
 of them that do not depend on the package."""
 
+import signal
 from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import replace
@@ -188,3 +189,9 @@ def changed(document, path, value):
     else:
         inner[last] = value
     return copy
+
+
+def heed_interrupts():
+    """Heed interrupts in a new process, also if the tests run in the background, where
+    a shell has them ignored."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import psutil
 import pytest
+from support import heed_interrupts
 
 HELPERS = Path(__file__).resolve().parents[1] / "helpers"
 # A daemon that leaves a child in a session of its own, as Slurm's do for jobs; it notes both.
@@ -40,7 +41,9 @@ def test_no_daemon_and_no_job_of_one_is_left(tmp_path, number):
     (tmp_path / "link").symlink_to(folder)
     command = [sys.executable, "-c", TESTS, folder, DAEMON, str(int(number or 0))]
     environment = {"PYTHONPATH": str(HELPERS), "PATH": "/usr/bin:/bin"}
-    with subprocess.Popen(command, env=environment) as tests:
+    with subprocess.Popen(
+        command, env=environment, preexec_fn=heed_interrupts
+    ) as tests:
         if number is not None:
             pids = _wait_for_two(folder / "pids")
             tests.send_signal(number)
