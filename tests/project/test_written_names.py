@@ -18,6 +18,7 @@ from made_urdf import joint, link, written
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
+from elastocal.application import exported
 from elastocal.application.calibrated import compute_nominal_poses
 from elastocal.command.main import app
 from elastocal.errors import InputError
@@ -282,11 +283,12 @@ def test_a_command_that_is_killed_leaves_the_old_files_or_none(
         monkeypatch.setattr(style, "save", lambda *_: os._exit(9))
         monkeypatch.setattr(typesetting, "compile_document", lambda *_: os._exit(9))
         monkeypatch.setattr(json_files, "write_json", lambda *_: os._exit(9))
-        monkeypatch.setattr(
-            atomic_writes,
-            "write_text",
-            lambda path, text: (path.write_text(text), os._exit(9)),
-        )
+        for module in (atomic_writes, exported):
+            monkeypatch.setattr(
+                module,
+                "write_text",
+                lambda path, text: (path.write_text(text), os._exit(9)),
+            )
         run(*arguments)
         os._exit(0)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 9

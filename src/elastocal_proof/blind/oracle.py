@@ -382,7 +382,8 @@ def _compute_visible_units(
         noncentrality.project_change(apply_defects(noncentrality.robot, [defect]))
         for defect in defects
     ]
-    signals, residuals = np.swapaxes(projections, 0, 1)
+    signals = np.array([signal for signal, _ in projections])
+    residuals = np.array([residual for _, residual in projections])
     lengths = np.linalg.norm(residuals, axis=1)
     visible = lengths**2 > _ABSORBED * np.linalg.norm(signals, axis=1) ** 2
     units: np.ndarray = residuals[visible] / lengths[visible, None]
