@@ -44,6 +44,17 @@ def test_residuals_have_a_row_for_each_measurement(result, campaign):
     assert result.residuals["held_out"].any()
 
 
+def test_residuals_are_without_gross_errors_as_those_of_the_report(nominal, measured):
+    wrong = measured.copy()
+    wrong.loc[20, "x"] += 0.05
+    target = {"reflector": {"point": "tool", "offset_m": [0, 0, 0], "offset_std_m": 0}}
+    settings = {"frame": "base", "declared": [], "remainder": "none"}
+    campaign = ec.Campaign.from_table(nominal, wrong, targets=target, **settings)
+    result = ec.diagnose(campaign)
+    assert len(result.verdict.gross_errors) == 1
+    assert len(result.residuals["row"]) == len(campaign) - 1
+
+
 def test_report_is_written_and_its_facts_name_the_effect(result, tmp_path):
     result.report(tmp_path / "report.pdf")
     assert (tmp_path / "report.pdf").read_bytes().startswith(b"%PDF")

@@ -11,11 +11,7 @@ from elastocal.figures.loop import (
 )
 from elastocal.figures.style import save
 from elastocal.io.json_files import read_json
-from elastocal.loop.schemas import (
-    find_worst_measurement,
-    read_residuals,
-    stack_joint_angles,
-)
+from elastocal.loop.schemas import find_worst_joint_angles, read_residuals
 from elastocal.mechanics.kinematics import locate_corners
 from elastocal.mechanics.robot_file import parse_robot
 from elastocal.verdict import read_verdict
@@ -24,10 +20,7 @@ from elastocal.verdict import read_verdict
 def draw_campaign(job: Job) -> None:
     robot = parse_robot(read_json(job.input.descriptions)["robot"])
     table = read_residuals(job.input.residuals, robot.joints)
-    arm = locate_corners(
-        robot.chain,
-        stack_joint_angles(table, robot.joints)[find_worst_measurement(table)],
-    )
+    arm = locate_corners(robot.chain, find_worst_joint_angles(table, robot.joints))
     candidates = pd.read_csv(job.input.candidates).fillna({"note": ""})
     verdict = read_verdict(job.input.verdict)
     errors = pd.read_csv(job.input.before_after).to_dict("records")

@@ -16,6 +16,7 @@ from elastocal.loop.diagnosis_tables import (
     tabulate_candidates,
     tabulate_parameters,
 )
+from elastocal.loop.schemas import drop_gross_errors
 from elastocal.loop.whole import build_calibrated_robot, judge_and_predict
 
 if TYPE_CHECKING:
@@ -111,12 +112,13 @@ class DiagnosisResult:
 
     @cached_property
     def residuals(self) -> dict[str, np.ndarray]:
-        """Columns (N,) of the residuals before and after, as residuals.parquet."""
+        """Columns (N,) of the residuals before and after, as residuals.parquet but
+        without gross errors."""
         blocks = [*generate_residual_blocks(self.training, self.judgement)]
         columns = {}
         for name in blocks[0]:
             columns[name] = np.concatenate([block[name] for block in blocks])
-        return columns
+        return drop_gross_errors(columns)
 
     @property
     def plot(self) -> Plots:

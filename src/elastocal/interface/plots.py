@@ -12,7 +12,7 @@ from elastocal.figures.loop import (
     draw_probabilities,
     draw_residual_arrows,
 )
-from elastocal.loop.schemas import find_worst_measurement, stack_joint_angles
+from elastocal.loop.schemas import find_worst_joint_angles
 from elastocal.mechanics.kinematics import locate_corners
 
 if TYPE_CHECKING:
@@ -56,8 +56,7 @@ class Plots:
         above."""
         robot = self.result.campaign.robot
         table = self.result.residuals
-        worst = find_worst_measurement(table)
-        angles = stack_joint_angles(table, robot.joints)[worst]
+        angles = find_worst_joint_angles(table, robot.joints)
         return draw_residual_arrows(table, locate_corners(robot.chain, angles))
 
     def candidates(self, axes: Axes | None = None) -> Figure:

@@ -27,7 +27,11 @@ RESIDUALS = SCHEMAS["residuals"]
 
 def read_residuals(path: str | Path, joints: int) -> dict[str, np.ndarray]:
     """Read the columns of a residuals table, without the rows of gross errors."""
-    columns = read_table(path, RESIDUALS.for_joints(joints))
+    return drop_gross_errors(read_table(path, RESIDUALS.for_joints(joints)))
+
+
+def drop_gross_errors(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Drop the rows of gross errors from the columns of a residuals table."""
     kept = ~columns["gross_error"]
     return {name: values[kept] for name, values in columns.items()}
 
@@ -42,3 +46,8 @@ def find_worst_measurement(table: Mapping[str, np.ndarray]) -> int:
 def stack_joint_angles(table: Mapping[str, np.ndarray], joints: int) -> np.ndarray:
     """Return the joint angles (N, n) of a residuals table, those of the chain, rad."""
     return np.column_stack([table[f"q{joint}"] for joint in range(1, joints + 1)])
+
+
+def find_worst_joint_angles(table: Mapping[str, np.ndarray], joints: int) -> np.ndarray:
+    """Find the joint angles (n,) of the worst measurement of a residuals table."""
+    return stack_joint_angles(table, joints)[find_worst_measurement(table)]
