@@ -165,9 +165,11 @@ def _run_and_print(
 def format_runs(runs: Iterable[DiagnosisRun]) -> list[str]:
     """Return a table with the verdict, the errors before and after on held-out poses (RMS)
     and the seconds of each run; below it, why runs failed."""
+    from tabulate import tabulate
+
     from elastocal.verdict import read_verdict
 
-    rows = [_HEADER]
+    rows = []
     faults = []
     for run in runs:
         cells = (_FAILED, "", "")
@@ -180,14 +182,11 @@ def format_runs(runs: Iterable[DiagnosisRun]) -> list[str]:
             before, after = (f"{1e3 * error.rms_m:.3f}" for error in errors)
             cells = (verdict.verdict, before, after)
         rows.append((run.campaign, *cells, f"{run.seconds:.0f}"))
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = [_align_row(row, widths) for row in rows]
-    return [*lines, *faults]
-
-
-def _align_row(row: Sequence[str], widths: Sequence[int]) -> str:
-    """Return a row of the table: names to the left, numbers to the right."""
-    campaign, verdict, *numbers = zip(row, widths, strict=True)
-    words = [text.ljust(width) for text, width in (campaign, verdict)]
-    words += [text.rjust(width) for text, width in numbers]
-    return "  ".join(words).rstrip()
+    table = tabulate(
+        rows,
+        _HEADER,
+        tablefmt="plain",
+        colalign=("left", "left", "right", "right", "right"),
+        disable_numparse=True,
+    )
+    return [*map(str.rstrip, table.splitlines()), *faults]

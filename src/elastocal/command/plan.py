@@ -236,8 +236,7 @@ def _read_cell(
     arm: Robot, boxes: Iterable[str], tracker: str | None, floor_m: float
 ) -> Cell:
     """Read boxes and the tracker's position; radii are shares of the arm's reach."""
-    from elastocal.application.inverse_kinematics import compute_reach_m
-    from elastocal.application.planning.cell import COLUMN_SHARE, RADIUS_SHARE, Cell
+    from elastocal.application.planning.cell import build_cell
 
     corners = []
     for text in boxes:
@@ -251,14 +250,7 @@ def _read_cell(
             )
         corners.append(box)
     tracker_m = None if tracker is None else parse_numbers("--tracker", tracker, 3)
-    reach_m = compute_reach_m(arm)
-    return Cell(
-        tuple(corners),
-        tracker_m,
-        RADIUS_SHARE * reach_m,
-        floor_m,
-        COLUMN_SHARE * reach_m,
-    )
+    return build_cell(arm, corners, tracker_m, floor_m)
 
 
 def _read_targets(descriptions: list[str], chain: Chain) -> tuple[Target, ...]:

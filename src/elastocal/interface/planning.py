@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.application.inverse_kinematics import compute_reach_m
-from elastocal.application.planning.cell import COLUMN_SHARE, RADIUS_SHARE, Cell
+from elastocal.application.planning.cell import build_cell
 from elastocal.application.planning.plan import choose_plan, find_allowed_candidates
 from elastocal.application.planning.survey import SENSORS, Survey
 from elastocal.campaigns.campaign import OFFSET_STD_M, Target
@@ -106,15 +105,7 @@ def plan(
         orientation_rad=sensor.orientation_rad,
         force_N=force_N,
     )
-    reach_m = compute_reach_m(robot)
-    cell = Cell(
-        boxes=(),
-        tracker_m=None,
-        radius_m=RADIUS_SHARE * reach_m,
-        floor_m=0.0,
-        column_m=COLUMN_SHARE * reach_m,
-    )
-    candidates = find_allowed_candidates(survey, cell, _CANDIDATES, seed)
+    candidates = find_allowed_candidates(survey, build_cell(robot), _CANDIDATES, seed)
     return MeasurementPlan(
         choose_plan(survey, candidates, poses, held_out, seed), survey
     )

@@ -9,6 +9,7 @@ from elastocal.application.inverse_kinematics import compute_reach_m
 from elastocal.application.planning.cell import (
     COLUMN_SHARE,
     Cell,
+    build_cell,
     check_configurations,
     sample_links,
 )
@@ -109,3 +110,11 @@ def test_the_forearm_is_outside_the_column(robot, reported):
 def test_an_empty_cell_allows_everything(robot, reported):
     constraints = check_with_target(Cell((), None, 0.02), robot, reported)
     assert all(is_met.all() for is_met in constraints.values())
+
+
+def test_a_cell_of_a_robot_grows_with_its_reach(kuka):
+    reach_m = compute_reach_m(kuka)
+    cell = build_cell(kuka)
+    assert cell.radius_m == pytest.approx(0.04 * reach_m)
+    assert cell.column_m == pytest.approx(0.1 * reach_m)
+    assert (cell.boxes, cell.tracker_m, cell.floor_m) == ((), None, 0.0)

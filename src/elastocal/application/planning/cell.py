@@ -14,10 +14,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.application.inverse_kinematics import compute_reach_m
 from elastocal.mechanics.chain import MeasuringPoint
 from elastocal.mechanics.kinematics import compute_point_poses
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from elastocal.campaigns.campaign import Target
     from elastocal.mechanics.robot import Robot
 
@@ -52,6 +55,19 @@ class Cell:
     radius_m: float
     floor_m: float | None = None
     column_m: float = 0.0
+
+
+def build_cell(
+    robot: Robot,
+    boxes: Sequence[np.ndarray] = (),
+    tracker_m: np.ndarray | None = None,
+    floor_m: float = 0.0,
+) -> Cell:
+    """Build the cell of a robot, whose radii are shares of its reach; other arguments as
+    of `Cell`."""
+    reach_m = compute_reach_m(robot)
+    radius_m = RADIUS_SHARE * reach_m
+    return Cell(tuple(boxes), tracker_m, radius_m, floor_m, COLUMN_SHARE * reach_m)
 
 
 def check_configurations(
