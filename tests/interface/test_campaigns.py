@@ -66,6 +66,7 @@ def test_folder_is_read_with_a_robot_of_the_project(tmp_path, kuka):
         ({"wrenches": "heavy"}, "wrenches"),
         ({"frame": "moon"}, "frame"),
         ({"declared": ["magic"]}, "declared[0]: found 'magic'"),
+        ({"remainder": "magic"}, "remainder: found 'magic'"),
         ({"columns": {"colour": np.zeros(60)}}, "columns: found 'colour'"),
         ({"no_such_key": 1}, "no_such_key"),
     ],

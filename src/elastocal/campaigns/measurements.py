@@ -33,6 +33,8 @@ MOST_JOINTS = 99
 
 CSV = "measurements.csv"
 PARQUET = "measurements.parquet"
+# Columns that a campaign can do without.
+CONDITIONS = ("time_s", "temperature_c", "u95_m")
 ROTATION = ("rx", "ry", "rz")
 # A sheet for people has more columns. One is to be ticked and is not read.
 TICK_COLUMN = "done"

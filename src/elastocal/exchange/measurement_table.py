@@ -16,6 +16,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from elastocal.campaigns.measurements import CONDITIONS
 from elastocal.campaigns.tables import Cells, TextTable, read_text_table
 from elastocal.counting import format_count
 from elastocal.errors import InputError, find_text_fault, suggest_names
@@ -50,8 +51,6 @@ from elastocal.mechanics.robot import Robot
 _EMPTY = re.compile(
     r"|[+-]?nan(\(\w+\))?|[-–—]+|#?n/?a|n\.a\.|null|none", re.IGNORECASE
 )
-# Columns that a campaign can do without.
-CONDITIONS = ("time_s", "temperature_c", "u95_m")
 _Value = TypeVar("_Value")
 
 

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from elastocal.campaigns.measurements import CONDITIONS
 from elastocal.campaigns.tables import read_text_table
 from elastocal.errors import InputError
 from elastocal.exchange.joining import refuse_unmeasured_rows
 from elastocal.exchange.measurement_table import (
-    CONDITIONS,
     ImportedMeasurements,
     ImportOptions,
     OtherFile,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +20,13 @@ from elastocal.effects.catalogue import list_effects
 from elastocal.errors import InputError, suggest_names
 from elastocal.exchange.numbering import number_loads_and_repeats, number_poses
 from elastocal.fitting.model import Case, prepare_case
+from elastocal.interface.arrays import check_array
 from elastocal.io.documents import check_document
+from elastocal.loop.loading import (
+    check_regression,
+    describe_campaign,
+    read_described_campaign,
+)
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot_file import describe_robot
 
@@ -134,7 +139,7 @@ class Campaign:
         **settings
             As of `Campaign`.
         """
-        angles = [f"q{joint}" for joint in range(1, robot.joints + 1)]
+        angles = _name_angles(robot)
         missing = [name for name in (*angles, *"xyz") if name not in table]
         if missing:
             allowed = f"a table with {', '.join(angles)}, x, y and z"
@@ -200,22 +205,28 @@ def read_campaign(
         Names the file and row or key, what was found and what is allowed.
     """
     on_disk = read_campaign_folder(folder, robots_folder or folder)
-    checked = reading.read_campaign(on_disk, list_effects())
-    validating = None
-    if on_disk.held_out_path is not None:
-        validating = read_campaign(on_disk.held_out_path, robots_folder)
-        # Refuse a campaign of another chain, or of too few poses.
-        reading.read_held_out_campaign(on_disk, list_effects())
-    descriptions = {
-        "source": on_disk.source,
-        "campaign": _add_defaults(on_disk.document)
-        | {"table": checked.table, "header_line": checked.header_line},
-        "robot": on_disk.robot_document,
-        "held_out": validating.descriptions if validating else None,
+    descriptions, checked = read_described_campaign(on_disk)
+    validation = None
+    held_out = reading.read_held_out_campaign(on_disk, list_effects())
+    if on_disk.held_out_folder is not None and held_out is not None:
+        described = describe_campaign(on_disk.held_out_folder, held_out)
+        validation = _wrap(on_disk.held_out_folder.robot, held_out, described, None)
+    descriptions |= {
+        "held_out": validation.descriptions if validation else None,
         "files": on_disk.digests,
     }
+    return _wrap(on_disk.robot, checked, descriptions, validation)
+
+
+def _wrap(
+    robot: Robot,
+    checked: campaigns.Campaign,
+    descriptions: dict[str, Any],
+    validation: Campaign | None,
+) -> Campaign:
+    """Make a campaign of parts that were checked before, see `Campaign`."""
     campaign = Campaign.__new__(Campaign)
-    _set_fields(campaign, on_disk.robot, checked, descriptions, validating)
+    _set_fields(campaign, robot, checked, descriptions, validation)
     return campaign
 
 
@@ -223,16 +234,6 @@ def _set_fields(campaign: Campaign, *values: Any) -> None:
     """Set the fields of a new campaign, in their order."""
     for name, value in zip(Campaign.__dataclass_fields__, values, strict=True):
         object.__setattr__(campaign, name, value)
-
-
-def _add_defaults(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Add the defaults of optional keys of campaign.yaml."""
-    return {
-        "compliance": "nominal",
-        "declared": [],
-        "holdout": DEFAULT_HOLDOUT,
-        **document,
-    }
 
 
 def _describe(document: Mapping[str, Any], robot: Robot) -> dict[str, Any]:
@@ -275,13 +276,13 @@ def _arrange(
     columns : further columns.
     targets : names of the targets, in the order of positions (N, T, 3).
     """
-    joints = robot.joints
-    angles = _check_array("joint_angles", arrays["joint_angles"], (None, joints))
+    angles = check_array(
+        _SOURCE, "joint_angles", arrays["joint_angles"], (None, robot.joints)
+    )
     count = len(angles)
     positions = _check_targets("positions", arrays["positions"], count, targets)
     row, target = np.nonzero(~np.isnan(positions).all(axis=2))
-    names = [f"q{joint}" for joint in range(1, joints + 1)]
-    values = _name_columns(names, angles[row])
+    values = _name_columns(_name_angles(robot), angles[row])
     values |= _name_columns("xyz", positions[row, target])
     if arrays["rotation_vectors"] is not None:
         turns = _check_targets(
@@ -292,7 +293,9 @@ def _arrange(
         wrenches = _check_wrenches(arrays["wrenches"], count)
         values |= _name_columns(WRENCH_NAMES, wrenches[row])
     for name, column in columns.items():
-        values[name] = _check_array(f"columns[{name!r}]", column, (count,), None)[row]
+        values[name] = check_array(
+            _SOURCE, f"columns[{name!r}]", column, (count,), None
+        )[row]
     if "target" not in values:
         if positions.shape[1] != len(targets):
             allowed = f"columns={{'target': ...}}, or positions (N, {len(targets)}, 3)"
@@ -307,8 +310,8 @@ def _check_targets(
     """Check values of targets, (N, 3) or (N, T, 3), and return them as (N, T, 3)."""
     array = np.asarray(values)
     if array.ndim == 2:
-        return _check_array(argument, array, (count, 3))[:, None]
-    return _check_array(argument, array, (count, len(targets), 3))
+        return check_array(_SOURCE, argument, array, (count, 3))[:, None]
+    return check_array(_SOURCE, argument, array, (count, len(targets), 3))
 
 
 def _check_wrenches(values: ArrayLike | None, count: int) -> np.ndarray:
@@ -316,37 +319,12 @@ def _check_wrenches(values: ArrayLike | None, count: int) -> np.ndarray:
     array = np.asarray(values)
     if array.ndim == 2 and array.shape[1] == 3:
         array = np.pad(array, ((0, 0), (0, 3)))
-    return _check_array("wrenches", array, (count, 6))
+    return check_array(_SOURCE, "wrenches", array, (count, 6))
 
 
-def _check_array(
-    argument: str,
-    values: ArrayLike | None,
-    shape: tuple[int | None, ...],
-    kind: type | None = float,
-) -> np.ndarray:
-    """Check the shape of an array; None stands for any length.
-
-    Parameters
-    ----------
-    argument : name of the argument, for messages.
-    values : the array.
-    shape : allowed shape.
-    kind : type of the numbers; None for any values.
-    """
-    try:
-        array = np.asarray(values, kind)
-    except (TypeError, ValueError):
-        raise InputError(_SOURCE, argument, "no numbers", "an array") from None
-    fits = array.ndim == len(shape) and all(
-        allowed is None or length == allowed
-        for length, allowed in zip(array.shape, shape, strict=True)
-    )
-    if not fits:
-        lengths = ", ".join("N" if length is None else str(length) for length in shape)
-        finding = f"an array of shape {array.shape}"
-        raise InputError(_SOURCE, argument, finding, f"an array of shape ({lengths})")
-    return array
+def _name_angles(robot: Robot) -> list[str]:
+    """Names of the columns with the joint angles of a robot."""
+    return [f"q{joint}" for joint in range(1, robot.joints + 1)]
 
 
 def _name_columns(names: Iterable[str], values: np.ndarray) -> dict[str, np.ndarray]:
@@ -362,15 +340,15 @@ def _make_table(rows: _Rows, robot: Robot) -> Cells:
             allowed = suggest_names(name, sorted(described))
             raise InputError(_SOURCE, "columns", repr(name), allowed)
     headers = {name: f"columns[{name!r}]" for name in rows.columns}
+    angles = _name_angles(robot)
     for argument, names in (
-        ("joint_angles", [f"q{joint}" for joint in range(1, robot.joints + 1)]),
+        ("joint_angles", angles),
         ("positions", "xyz"),
         ("rotation_vectors", ROTATION),
         ("wrenches", WRENCH_NAMES),
     ):
         headers |= {name: f"{argument}[{index}]" for index, name in enumerate(names)}
     cells = Cells(_SOURCE, _encode(rows.columns), rows.numbers, headers=headers)
-    angles = [name for name in rows.columns if re.fullmatch(r"q\d+", name)]
     numbers = number_poses(cells, cells.matrix(angles))
     numbers["target"] = np.array(cells.texts("target"))
     numbers |= number_loads_and_repeats(cells, rows.columns | numbers)
@@ -401,4 +379,5 @@ def _complete_settings(
     }
     check_document(document, "campaign", _SOURCE)
     reading.check_declared(document, list_effects(), _SOURCE)
+    check_regression(document, _SOURCE)
     return document

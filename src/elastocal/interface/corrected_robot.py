@@ -8,7 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.accuracy import ErrorPrediction, predict_errors
+from elastocal.application.accuracy import (
+    ErrorPrediction,
+    predict_errors,
+    select_campaign_commands,
+)
 from elastocal.application.calibrated import CalibratedRobot, predict_poses
 from elastocal.application.exported import fold_effects, write_robot_file
 from elastocal.application.path_correction import CorrectedPath, correct_path
@@ -20,6 +24,7 @@ from elastocal.exchange.target_path import (
     read_target_path_for,
 )
 from elastocal.exchange.urdf_writing import write_calibrated_origins
+from elastocal.interface.arrays import check_array
 from elastocal.io.atomic_writes import write_atomically
 from elastocal.loop.calibrated_files import decide_by_prediction
 from elastocal.mechanics.components import WRENCH_NAMES
@@ -31,6 +36,9 @@ if TYPE_CHECKING:
 
     from elastocal.mechanics.robot import Robot
     from elastocal.verdict import Verdict
+
+# What messages name as the source of a wrong argument.
+_SOURCE = "CorrectedRobot"
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,11 +144,11 @@ class CorrectedRobot:
         accepted_risk : float
             Accepted probability of a wrong decision.
         """
-        states = self.calibrated.states
-        commands = self.nominal.reported_angles(states.joint_angles)
-        prediction = predict_errors(self.calibrated, commands, states.wrench)
-        configurations = self.verdict.heldout.configurations
-        shortfalls = list_shortfalls(configurations, states, self.nominal)
+        commands = select_campaign_commands(self.calibrated)
+        prediction = predict_errors(self.calibrated, *commands)
+        shortfalls = list_shortfalls(
+            self.verdict.heldout.configurations, self.calibrated.states, self.nominal
+        )
         return decide_by_prediction(prediction, shortfalls, tolerance_m, accepted_risk)[
             0
         ]
@@ -166,20 +174,11 @@ class CorrectedRobot:
         self, joint_angles: ArrayLike, wrenches: ArrayLike | None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Check the shapes of commands and loads."""
-        angles = np.asarray(joint_angles, float)
-        joints = self.nominal.joints
-        if angles.ndim != 2 or angles.shape[1] != joints:
-            finding = f"an array of shape {angles.shape}"
-            allowed = f"an array of shape (N, {joints})"
-            raise InputError("CorrectedRobot", "joint_angles", finding, allowed)
-        loads = np.zeros((len(angles), 6))
-        if wrenches is not None:
-            loads = np.asarray(wrenches, float)
-        if loads.shape != (len(angles), 6):
-            finding = f"an array of shape {loads.shape}"
-            allowed = f"an array of shape ({len(angles)}, 6)"
-            raise InputError("CorrectedRobot", "wrenches", finding, allowed)
-        return angles, loads
+        shape = (None, self.nominal.joints)
+        angles = check_array(_SOURCE, "joint_angles", joint_angles, shape)
+        if wrenches is None:
+            return angles, np.zeros((len(angles), 6))
+        return angles, check_array(_SOURCE, "wrenches", wrenches, (len(angles), 6))
 
 
 def _arrange_path(table: pd.DataFrame, joints: int) -> TargetPath:

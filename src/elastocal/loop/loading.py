@@ -18,6 +18,7 @@ from elastocal.io.storage import write_table
 from elastocal.loop.schemas import MEASUREMENTS
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from typing import Any
 
     from elastocal.campaigns.campaign import Campaign, Measurements
@@ -74,7 +75,9 @@ def load_campaign(
     held_out_descriptions = None
     held_out_campaign = reading.read_held_out_campaign(folder, list_effects())
     if folder.held_out_folder is not None and held_out_campaign is not None:
-        held_out_descriptions = _describe(folder.held_out_folder, held_out_campaign)
+        held_out_descriptions = describe_campaign(
+            folder.held_out_folder, held_out_campaign
+        )
         held_out = held_out_campaign.measurements
     descriptions |= {"held_out": held_out_descriptions, "files": folder.digests}
     return descriptions, training, held_out
@@ -86,18 +89,13 @@ def read_described_campaign(
     """Read a campaign with its descriptions as `load_campaign`, but without a split and
     without the campaign that validates it."""
     campaign = reading.read_campaign(folder, list_effects())
-    return _describe(folder, campaign), campaign
+    return describe_campaign(folder, campaign), campaign
 
 
-def _describe(folder: CampaignFolder, campaign: Campaign) -> dict[str, Any]:
+def describe_campaign(folder: CampaignFolder, campaign: Campaign) -> dict[str, Any]:
     """Return the documents of a campaign with the defaults of optional keys, so that no
     later step has to know them."""
-    regression = folder.document.get("remainder", "auto")
-    allowed = [*REMAINDERS, *list_plugin_names(REGRESSIONS)]
-    if regression not in allowed:
-        raise InputError(
-            folder.source, "remainder", repr(regression), ", ".join(allowed)
-        )
+    check_regression(folder.document, folder.source)
     defaults = {"compliance": "nominal", "declared": [], "holdout": DEFAULT_HOLDOUT}
     table = {"table": campaign.table, "header_line": campaign.header_line}
     return {
@@ -105,3 +103,12 @@ def _describe(folder: CampaignFolder, campaign: Campaign) -> dict[str, Any]:
         "campaign": defaults | folder.document | table,
         "robot": folder.robot_document,
     }
+
+
+def check_regression(document: Mapping[str, Any], source: str) -> None:
+    """Refuse a regression that neither this package nor a plug-in has; `source`: file of
+    the document of the campaign, for messages."""
+    regression = document.get("remainder", "auto")
+    allowed = [*REMAINDERS, *list_plugin_names(REGRESSIONS)]
+    if regression not in allowed:
+        raise InputError(source, "remainder", repr(regression), ", ".join(allowed))

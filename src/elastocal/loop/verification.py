@@ -27,6 +27,7 @@ from elastocal.application.verification import (
 from elastocal.campaigns.campaign import DOCUMENT, average_by_group
 from elastocal.campaigns.holdout import list_poses, number_configurations
 from elastocal.campaigns.measurements import (
+    CONDITIONS,
     CSV,
     ROTATION,
     describe_columns,
@@ -76,9 +77,6 @@ _SAME_ERROR = 1e-3
 # Share of the measured RMS error in the base frame that a placement must leave at most,
 # so that the frame is suspected instead of the robot.
 _FRAME_SHARE = 0.5
-# Columns of campaigns that the measurements of a verification have only if their table
-# states them.
-_CONDITIONS = ("time_s", "temperature_c", "u95_m")
 
 
 @dataclass(frozen=True)
@@ -434,7 +432,7 @@ def join_measurements(
     session = int(before.session.max()) + 1
     further = _tabulate_session(campaign, targets, measured, session)
     remarks = []
-    for condition in _CONDITIONS:
+    for condition in CONDITIONS:
         if condition in columns and condition not in further:
             remarks.append(
                 f"{condition} is left out: the new measurements do not have it"
