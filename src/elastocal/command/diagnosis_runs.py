@@ -165,7 +165,7 @@ def _run_and_print(
 def format_runs(runs: Iterable[DiagnosisRun]) -> list[str]:
     """Return a table with the verdict, the errors before and after on held-out poses (RMS)
     and the seconds of each run; below it, why runs failed."""
-    from tabulate import tabulate
+    import pandas as pd
 
     from elastocal.verdict import read_verdict
 
@@ -182,9 +182,8 @@ def format_runs(runs: Iterable[DiagnosisRun]) -> list[str]:
             before, after = (f"{1e3 * error.rms_m:.3f}" for error in errors)
             cells = (verdict.verdict, before, after)
         rows.append((run.campaign, *cells, f"{run.seconds:.0f}"))
-    table = tabulate(
-        rows,
-        _HEADER,
+    table = pd.DataFrame(rows, columns=[*_HEADER]).to_markdown(
+        index=False,
         tablefmt="plain",
         colalign=("left", "left", "right", "right", "right"),
         disable_numparse=True,
