@@ -23,7 +23,7 @@ audit: .venv/ready-for-audit
 	$(BIN)/snakemake -j$(CORES) audit
 
 # Of the slow tests none: blind proof, planted errors, closed loop, demonstration, tutorial, Slurm, wheel and site are in
-# test-slow. CI adds the tenth of a commit: make test SLOW="part --part c0ffee"
+# test-slow. CI adds the twentieth of a commit: make test SLOW="part --part c0ffee"
 SLOW ?= none
 test: .venv/ready-for-tests
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder --slow $(SLOW)

@@ -18,6 +18,9 @@ from elastocal.study.strategies import strategy_from_document
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
+# CI runs one part of this number of parts of the slow tests with each commit.
+PARTS = 20
+
 CONFIG = Path(__file__).resolve().parents[1] / "config"
 
 # Every run draws the same examples, so that a failing test fails again. A slow machine
@@ -37,12 +40,12 @@ def pytest_addoption(parser):
         "--slow",
         choices=["none", "all", "part"],
         default="none",
-        help="run slow tests: none, all, or a tenth",
+        help="run slow tests: none, all, or a twentieth",
     )
     parser.addoption(
         "--part",
         default="0",
-        help="hexadecimal number, as of a commit, that chooses the tenth of the slow tests",
+        help="hexadecimal number, as of a commit, that chooses the twentieth of the slow tests",
     )
 
 
@@ -50,12 +53,12 @@ def pytest_collection_modifyitems(config, items):
     """Deselect slow tests unless they are asked for, and run the files that take minutes
     first, so that no worker has one left at the end.
 
-    The tests of a file stay together because they share fixtures: a tenth of the slow
-    tests is every tenth slow file.
+    The tests of a file stay together because they share fixtures: a twentieth of the
+    slow tests is every twentieth slow file.
     """
     slow = sorted({item.path for item in items if item.get_closest_marker("slow")})
-    tenth = int(config.getoption("part")[:8], 16) % 10
-    selections = {"none": [], "all": slow, "part": slow[tenth::10]}
+    part = int(config.getoption("part")[:8], 16) % PARTS
+    selections = {"none": [], "all": slow, "part": slow[part::PARTS]}
     chosen = selections[config.getoption("slow")]
     deselected = []
     kept = []
@@ -115,6 +118,26 @@ def strategies():
 def config(config_folder):
     """The configuration of the repository."""
     return read_document(config_folder.parent / "config.yaml")
+
+
+@pytest.fixture
+def blank_figures(request, monkeypatch):
+    """Files of figures are blank, except in tests marked ``drawn``.
+
+    Rendering takes two thirds of the time of a command. Tests that do not look at the
+    pictures still compose each figure, and write files of its size and format.
+    """
+    # Most tests never load the library of figures.
+    from matplotlib.figure import Figure
+
+    if request.node.get_closest_marker("drawn"):
+        return
+    render = Figure.savefig
+
+    def save_blank(figure, *path, **options):
+        render(Figure(figure.get_size_inches()), *path, **options)
+
+    monkeypatch.setattr(Figure, "savefig", save_blank)
 
 
 @pytest.fixture(scope="session")

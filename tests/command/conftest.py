@@ -22,6 +22,11 @@ def run_command(*arguments):
     return CliRunner().invoke(app, [*map(str, arguments)])
 
 
+@pytest.fixture(autouse=True)
+def commands_draw_blank_figures(blank_figures):
+    """A command's own test looks at its figures if it is marked ``drawn``."""
+
+
 @pytest.fixture(scope="session")
 def elastocal():
     return run_command

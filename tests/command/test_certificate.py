@@ -49,6 +49,7 @@ def test_a_tolerance_needs_its_unit_and_a_tight_one_fails(
     assert result.exit_code == 1 and result.output.startswith("! fail")
 
 
+@pytest.mark.drawn
 def test_a_certificate_states_the_errors_of_the_campaign(elastocal, in_checkout):
     result, document = certify(elastocal, "0.5mm")
     assert result.exit_code == 0, result.output

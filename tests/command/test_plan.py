@@ -44,6 +44,7 @@ def compute_positions(sheet):
     return compute_nominal_poses(analysed("ur10"), commands)[0]
 
 
+@pytest.mark.drawn
 def test_a_plan_is_a_folder_to_fill_in_with_its_pages(
     plan, elastocal, refusal, tmp_path
 ):

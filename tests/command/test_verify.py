@@ -80,6 +80,7 @@ class Loop:
         return result, json.loads(document.read_text()) if document.exists() else None
 
 
+@pytest.mark.drawn
 def test_a_robot_as_predicted_passes_as_measured_and_nothing_remains(loop):
     loop.write(loop.move())
     result, document = loop.verify("--tolerance", "0.5mm")
