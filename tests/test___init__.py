@@ -25,6 +25,7 @@ NAMES = [
     "diagnose",
     "plan",
     "read_campaign",
+    "read_model",
     "read_robot",
     "read_verdict",
     "simulate",

@@ -7,10 +7,12 @@ import json
 import re
 from importlib import import_module, resources
 from textwrap import dedent, indent
+from typing import Any
 
 import yaml
 from jsonschema2md import Parser
 
+from elastocal.application.model_file import build_model_schema
 from elastocal.io.storage import TableSchema
 from elastocal.verdict import build_verdict_schema
 
@@ -59,7 +61,20 @@ def pages() -> dict[str, str]:
         f"{name}.md": _document(name, description)
         for name, description in DOCUMENTS.items()
     }
-    documents |= {"verdict.md": _verdict(), "tables.md": _tables()}
+    documents |= {
+        "verdict.md": _format_schema(
+            "verdict.json",
+            "a verdict. `elastocal.verdict` has the classes",
+            build_verdict_schema(),
+        ),
+        "model.md": _format_schema(
+            "Model file",
+            "a [model file](../../docs/model_file.md)."
+            " `elastocal.application.model_file` has the classes",
+            build_model_schema(),
+        ),
+        "tables.md": _tables(),
+    }
     return {
         "index.md": HEAD
         + "".join(f"{name.removesuffix('.md')}\n" for name in documents)
@@ -68,13 +83,10 @@ def pages() -> dict[str, str]:
     }
 
 
-def _verdict() -> str:
-    """Write the schema of verdict.json, which follows from the dataclasses."""
-    schema = json.dumps(build_verdict_schema(), indent=2)
-    return (
-        "# verdict.json\n\nThe JSON schema of a verdict. `elastocal.verdict` has the"
-        f" classes.\n\n```json\n{schema}\n```\n"
-    )
+def _format_schema(title: str, words: str, schema: dict[str, Any]) -> str:
+    """Write a schema that follows from dataclasses."""
+    text = json.dumps(schema, indent=2)
+    return f"# {title}\n\nThe JSON schema of {words}.\n\n```json\n{text}\n```\n"
 
 
 def _document(name: str, words: str) -> str:

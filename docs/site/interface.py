@@ -44,7 +44,7 @@ INTERFACE = {
         "elastocal.interface.plots": ("Plots",),
     },
     "Correct a robot": {
-        "elastocal.interface.corrected_robot": ("CorrectedRobot",),
+        "elastocal.interface.corrected_robot": ("CorrectedRobot", "read_model"),
         "elastocal.application.path_correction": ("CorrectedPath",),
     },
     "Compare diagnoses": {

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from elastocal.errors import InputError
     from elastocal.interface.campaigns import Campaign, read_campaign
     from elastocal.interface.comparison import Comparison, compare
-    from elastocal.interface.corrected_robot import CorrectedRobot
+    from elastocal.interface.corrected_robot import CorrectedRobot, read_model
     from elastocal.interface.diagnoses import DiagnosisResult, diagnose
     from elastocal.interface.planning import MeasurementPlan, check, plan, simulate
     from elastocal.interface.plots import Plots
@@ -47,6 +47,7 @@ _HOMES = {
     "diagnose": "elastocal.interface.diagnoses",
     "plan": "elastocal.interface.planning",
     "read_campaign": "elastocal.interface.campaigns",
+    "read_model": "elastocal.interface.corrected_robot",
     "read_robot": "elastocal.interface.robots",
     "read_verdict": "elastocal.verdict",
     "simulate": "elastocal.interface.planning",
@@ -72,6 +73,7 @@ __all__ = [
     "diagnose",
     "plan",
     "read_campaign",
+    "read_model",
     "read_robot",
     "read_verdict",
     "simulate",

@@ -1,9 +1,12 @@
+import json
+
 import numpy as np
 import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
 import elastocal as ec
+from elastocal.io.typed_json import to_document
 from elastocal.mechanics.kinematics import compute_poses
 
 ROTATION = ["rx", "ry", "rz"]
@@ -94,3 +97,41 @@ def test_commands_of_another_number_of_joints_are_refused(result):
         result.robot.predict(np.zeros((2, 5)))
     with pytest.raises(ec.InputError, match="wrenches"):
         result.robot.predict(np.zeros((2, 6)), np.zeros((3, 6)))
+
+
+@pytest.fixture(scope="module")
+def read_again(result, tmp_path_factory):
+    """The corrected robot by way of its model file."""
+    path = tmp_path_factory.mktemp("model") / "arm.elastocal.json"
+    result.robot.save(path)
+    return ec.read_model(path)
+
+
+def test_a_model_file_predicts_corrects_and_certifies_alike(
+    result, read_again, nominal, commands
+):
+    for first, second in zip(
+        read_again.predict(commands), result.robot.predict(commands), strict=True
+    ):
+        np.testing.assert_allclose(first, second, atol=1e-12)
+    table = wanted_poses(nominal, commands)
+    corrected = read_again.correct(table).table
+    expected = result.robot.correct(table).table
+    pd.testing.assert_frame_equal(corrected, expected, rtol=1e-9)
+    first = read_again.certify(2e-5)
+    second = result.robot.certify(2e-5)
+    assert first.decision == second.decision
+    assert first.limit_m == pytest.approx(second.limit_m, rel=1e-9)
+
+
+def test_a_model_file_keeps_the_verdict_and_the_robot(result, read_again, nominal):
+    written = json.loads(json.dumps(to_document(result.verdict)))
+    assert to_document(read_again.verdict) == written
+    assert read_again.nominal.chain == nominal.chain
+
+
+def test_another_file_is_no_model(tmp_path):
+    path = tmp_path / "robot.json"
+    path.write_text("[]", "utf-8")
+    with pytest.raises(ec.InputError, match="no model file"):
+        ec.read_model(path)

@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.noise import Noise
     from elastocal.mechanics.robot import Robot
     from elastocal.residual_model.regressions import Inputs, Predictor
+    from elastocal.verdict import RegressionChoice
 
 # States at a time, so that the intermediate results of a walk along all sites stay in
 # the processor's cache.
@@ -72,12 +73,31 @@ class ResidualModel:
         data, which the regression's intervals contain.
     typical : factor from the width of intervals to RMS errors, see
         `corrected.spread_of`.
+    choice : how it was chosen; None if unknown.
     """
 
     predictor: Predictor
     target_offset_m: np.ndarray
     sensor_m: float
     typical: float
+    choice: RegressionChoice | None = None
+
+
+@dataclass(frozen=True)
+class CampaignFit:
+    """The whole fit behind a calibrated robot.
+
+    Attributes
+    ----------
+    model, estimate : fit with all its effects, frames and targets.
+    covariance : (P, P) covariance of all its `list_parameters`.
+    observations : measurements that were fitted.
+    """
+
+    model: Model
+    estimate: Estimate
+    covariance: np.ndarray
+    observations: Observations
 
 
 @dataclass(frozen=True)
@@ -98,6 +118,7 @@ class CalibratedRobot:
     scope : meaning of its errors.
     fitted : states of the campaign; None if unknown.
     residual_model : None if no regression corrects the residuals.
+    fit : the whole fit; None if unknown.
     """
 
     robot: Robot
@@ -108,6 +129,7 @@ class CalibratedRobot:
     scope: Scope
     fitted: States | None = None
     residual_model: ResidualModel | None = None
+    fit: CampaignFit | None = None
 
     @property
     def states(self) -> States:

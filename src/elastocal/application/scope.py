@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.application.calibrated import (
+    CampaignFit,
     ResidualModel,
     calibrate_by_model,
     compute_nominal_poses,
@@ -36,7 +37,9 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import States
+    from elastocal.mechanics.robot import Robot
     from elastocal.residual_model.regressions import Predictor
+    from elastocal.verdict import RegressionChoice
 
 
 def calibrate_on_case(
@@ -61,24 +64,52 @@ def calibrate_on_case(
     residual_model : result of `build_residual_model`.
     """
     robot = case.campaign.robot
-    states = case.observations.states
     dof = 0.0
     if noise.source == "repeats" and not noise.joint_rad.any():
         repeatability_rad, dof = estimate_joint_repeatability(
             model, estimate, case.campaign.measurements
         )
         noise = replace(noise, joint_rad=np.full(robot.joints, repeatability_rad))
+    fit = CampaignFit(model, estimate, covariance, case.observations)
+    return calibrate_by_campaign_fit(robot, fit, noise, residual_model, dof)
+
+
+def calibrate_by_campaign_fit(
+    robot: Robot,
+    fit: CampaignFit,
+    noise: Noise,
+    residual_model: ResidualModel | None,
+    repeatability_dof: float,
+) -> CalibratedRobot:
+    """Build a calibrated robot, with its scope, from the whole fit of a campaign.
+
+    Parameters
+    ----------
+    robot : as its file declares it.
+    fit : fit with all its effects.
+    noise : of the campaign, with the repeatability of the joints.
+    residual_model : result of `build_residual_model`.
+    repeatability_dof : as in `Scope`.
+    """
+    parts = (fit.model, fit.estimate, fit.covariance)
+    states = fit.observations.states
     calibrated = replace(
-        calibrate_by_model(robot, model, estimate, covariance, noise),
+        calibrate_by_model(robot, *parts, noise),
         fitted=states,
         residual_model=residual_model,
+        fit=fit,
     )
-    scope = determine_scope(calibrated, model, estimate, covariance, states)
-    return replace(calibrated, scope=replace(scope, repeatability_dof=dof))
+    scope = determine_scope(calibrated, *parts, states)
+    scope = replace(scope, repeatability_dof=repeatability_dof)
+    return replace(calibrated, scope=scope)
 
 
 def build_residual_model(
-    case: Case, estimate: Estimate, predictor: Predictor, typical: float, noise_m: float
+    case: Case,
+    estimate: Estimate,
+    predictor: Predictor,
+    choice: RegressionChoice,
+    noise_m: float,
 ) -> ResidualModel | None:
     """Build the residual model of the end effector from a regression.
 
@@ -86,7 +117,7 @@ def build_residual_model(
     ----------
     case, estimate : fitted campaign.
     predictor : regression on the residuals of the fit.
-    typical : as in `ResidualModel`.
+    choice : how it was chosen.
     noise_m : the tracker's noise as the campaign knows it. The fit is no source of it,
         because it takes residuals that the regression explains for noise.
 
@@ -104,7 +135,9 @@ def build_residual_model(
     )
     repeats = case.observations.states.repeats
     sensor_m = noise_m * float(np.sqrt((1.0 / repeats).mean()))
-    return ResidualModel(predictor, offset_m, sensor_m, typical)
+    assert choice.spread is not None, "no regression was chosen"
+    typical = choice.spread.typical
+    return ResidualModel(predictor, offset_m, sensor_m, typical, choice)
 
 
 def _find_targets_on(targets: Sequence[Target], point: str) -> list[int]:

@@ -346,14 +346,20 @@ def find_poses_beyond_range(
     ----------
     [1] David, H. A. and Nagaraja, H. N., Order Statistics, section 6.4, Wiley, 2003.
     """
+    low, high = compute_pose_range(fitted_angles)
+    return np.asarray(((joint_angles < low) | (joint_angles > high)).any(axis=1))
+
+
+def compute_pose_range(fitted_angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the lowest and the highest angle (n,) of each joint that count as within
+    the range of poses (P, n), see `find_poses_beyond_range`."""
     poses, joints = fitted_angles.shape
     low = fitted_angles.min(axis=0)
     high = fitted_angles.max(axis=0)
     odds = 2.0 * joints / (_SIGNIFICANCE_LEVEL * (poses + 1))
     share = max(odds ** (1.0 / max(poses - 1, 1)) - 1.0, 0.0)
     margin = np.maximum(share * (high - low), SAME_POSE_RAD)
-    is_beyond = (joint_angles < low - margin) | (joint_angles > high + margin)
-    return np.asarray(is_beyond.any(axis=1))
+    return low - margin, high + margin
 
 
 def find_repeated(fitted_angles: np.ndarray, joint_angles: np.ndarray) -> np.ndarray:

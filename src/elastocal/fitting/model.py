@@ -50,7 +50,7 @@ _PLACEMENT_RAD = 1.0
 # Fixed-point iterations of the load at the displaced pose. Each reduces the error by
 # the ratio of deflection to reach, some 1 / 500 at 3 kN; the first error, that of the
 # commanded pose, is ten micrometres.
-_LOAD_ITERATIONS = 2
+LOAD_ITERATIONS = 2
 # Effects that determine how other effects act: compliances turn a wrench into angles,
 # masses are part of the load.
 LOAD_EFFECTS = ("joint_compliance", DECLARED_WEIGHT)
@@ -392,7 +392,7 @@ def evaluate_conditions(
     )
     if coordinates is not None:
         return conditions
-    for _ in range(_LOAD_ITERATIONS):
+    for _ in range(LOAD_ITERATIONS):
         displaced = compute_displaced_coordinates(model, estimate, conditions)
         motion = compute_motion(
             model.sites.chain, displaced, model.sites.tracked_points

@@ -15,6 +15,12 @@ from elastocal.application.accuracy import (
 )
 from elastocal.application.calibrated import CalibratedRobot, predict_poses
 from elastocal.application.exported import fold_effects, write_robot_file
+from elastocal.application.model_file import (
+    describe_model,
+    read_model_file,
+    restore_calibrated,
+    write_model,
+)
 from elastocal.application.path_correction import CorrectedPath, correct_path
 from elastocal.campaigns.measurements import ROTATION
 from elastocal.errors import InputError
@@ -153,6 +159,24 @@ class CorrectedRobot:
             0
         ]
 
+    def save(self, path: str | Path) -> None:
+        """Write the whole model, with its uncertainty and its verdict, as one JSON file.
+
+        `read_model` reads it again, and the evaluators of `elastocal.evaluators` need
+        nothing of this package; docs/model_file.md explains the format.
+
+        Parameters
+        ----------
+        path : str or path
+            Such as ``arm.elastocal.json``.
+
+        Raises
+        ------
+        InputError
+            An effect has no formula.
+        """
+        write_model(path, describe_model(self.calibrated, self.verdict))
+
     def to_robot_file(self, path: str | Path) -> tuple[str, ...]:
         """Write geometry, springs and weights as a robot file; return the names of the
         effects that no robot file can hold."""
@@ -179,6 +203,23 @@ class CorrectedRobot:
         if wrenches is None:
             return angles, np.zeros((len(angles), 6))
         return angles, check_array(_SOURCE, "wrenches", wrenches, (len(angles), 6))
+
+
+def read_model(path: str | Path) -> CorrectedRobot:
+    """Read a corrected robot from a model file.
+
+    Parameters
+    ----------
+    path : str or path
+        What `CorrectedRobot.save` has written.
+
+    Raises
+    ------
+    InputError
+        Names what was found and what is allowed.
+    """
+    contents = read_model_file(path)
+    return CorrectedRobot(restore_calibrated(contents, path), contents.verdict)
 
 
 def _arrange_path(table: pd.DataFrame, joints: int) -> TargetPath:

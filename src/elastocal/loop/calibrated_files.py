@@ -104,7 +104,7 @@ class DiagnosedCampaign:
                 self.case,
                 estimate,
                 fit_to_observations(remainder, model, estimate, self.case.observations),
-                remainder.spread.typical,
+                remainder,
                 self.verdict.noise.position_m,
             )
         robot = calibrate_on_case(

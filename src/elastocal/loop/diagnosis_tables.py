@@ -22,6 +22,7 @@ from elastocal.fitting.model import (
     list_parameters,
 )
 from elastocal.fitting.noise import parse_noise, serialize_noise
+from elastocal.fitting.stored_models import restore_model, serialize_model
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import read_table, write_table
@@ -37,14 +38,8 @@ if TYPE_CHECKING:
 
     from elastocal.diagnosis.next_experiment import Table
     from elastocal.diagnosis.verdict import Evidence
-    from elastocal.effects.protocol import Candidate
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case, Model
-
-# Fields of an estimate in diagnosis.json: single arrays, and tuples with one array for
-# each effect.
-_PLACEMENTS = ("frame_rotation", "frame_position", "target_offset", "target_rotation")
-_EFFECT_PARAMETERS = ("coefficients", "shapes")
 
 
 def diagnose_campaign(job: Any) -> None:
@@ -156,25 +151,12 @@ def serialize_diagnosis(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _serialize_step(step: Step) -> dict[str, Any]:
-    effects = step.fitted.model.effects
-    estimate = step.fitted.estimate
-    stated: dict[str, Any] = {"sessions": [int(entry) for entry in estimate.sessions]}
-    for name in _PLACEMENTS:
-        stated[name] = getattr(estimate, name).tolist()
-    for name in _EFFECT_PARAMETERS:
-        stated[name] = [values.tolist() for values in getattr(estimate, name)]
     return {
         "name": step.name,
         "kind": step.kind,
         "noise": serialize_noise(step.fitted.noise),
-        "effects": [effect.key for effect in effects],
-        "priors": [_list_priors(effect) for effect in effects],
-        "estimate": stated,
+        **serialize_model(step.fitted.model, step.fitted.estimate),
     }
-
-
-def _list_priors(effect: Candidate) -> list[float | None]:
-    return [parameter.prior_std for parameter in effect.parameters]
 
 
 def select_final_parameters(
@@ -238,25 +220,10 @@ def refit_step(case: Case, step: Mapping[str, Any]) -> Fit:
 def restore_step_model(case: Case, step: Mapping[str, Any]) -> tuple[Model, Estimate]:
     """Restore model and estimate of a step of diagnosis.json without a fit."""
     catalogue = {effect.key: effect for effect in case.model.effects} | case.candidates
-    effects = []
-    for key, priors in zip(step["effects"], step["priors"], strict=True):
-        effect = catalogue[key]
-        # If a prior differs from the catalogue's, the diagnosis has estimated its size.
-        parameters = tuple(
-            replace(parameter, prior_std=prior, sized=prior != parameter.prior_std)
-            for parameter, prior in zip(effect.parameters, priors, strict=True)
-        )
-        effects.append(replace(effect, parameters=parameters))
-    stated = step["estimate"]
-    values: dict[str, Any] = {}
-    for name in _PLACEMENTS:
-        values[name] = np.array(stated[name], float)
-    for name in _EFFECT_PARAMETERS:
-        values[name] = tuple(np.array(entry, float) for entry in stated[name])
-    model = replace(case.model, effects=tuple(effects))
+    model, estimate = restore_model(case.model, catalogue, step)
     if step["kind"] in ("frames", "kept"):
         model = build_nominal_model(model)
-    return model, Estimate(tuple(stated["sessions"]), **values)
+    return model, estimate
 
 
 def tabulate_candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:

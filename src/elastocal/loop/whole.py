@@ -139,16 +139,10 @@ def build_calibrated_robot(
     # What the model leaves beyond this noise counts as an error of the robot.
     noise_m = diagnosis.verdict.noise.position_m
     regression = None
-    spread = delivered.choice.spread if delivered is not None else None
-    if (
-        delivered is not None
-        and delivered.predictor is not None
-        and spread is not None
-        and not physics_only
-    ):
+    if delivered is not None and delivered.predictor is not None and not physics_only:
         residual = delivered.residual
         regression = build_residual_model(
-            case, final.estimate, delivered.predictor, spread.typical, noise_m
+            case, final.estimate, delivered.predictor, delivered.choice, noise_m
         )
     robot = calibrate_on_case(
         case, final.model, final.estimate, final.covariance, final.noise, regression

@@ -16,9 +16,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.linalg import lapack
 
+from elastocal.effects.formulas import Term, list_terms, make_symbolic_angles
 from elastocal.fitting.normal_equations import invert_cholesky_factor
 from elastocal.io import plugins
 from elastocal.io.plugins import load_plugins
+from elastocal.residual_model.laws import DisplacementLaw, ProcessLaw
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -106,12 +108,15 @@ class Predictor:
     std : function
         Returns the standard deviation of a new measurement about them, (M, 3) array, m;
         not a number if the regression states none.
+    law : DisplacementLaw or ProcessLaw, optional
+        Formula of the mean; None if it has none that other programs can evaluate.
     """
 
     mean: Callable[[Inputs], np.ndarray]
     std: Callable[[Inputs], np.ndarray] = lambda inputs: np.full(
         (len(inputs), 3), np.nan
     )
+    law: DisplacementLaw | ProcessLaw | None = None
 
 
 @dataclass(frozen=True)
@@ -328,7 +333,20 @@ def fit_ridge_harmonics(
                 for chunk in _split_into_chunks(queries)
             )
 
-        yield Predictor(mean)
+        yield Predictor(mean, law=_express_harmonics(coefficients, orders, joints))
+
+
+def _express_harmonics(
+    coefficients: np.ndarray, orders: int, joints: int
+) -> DisplacementLaw:
+    """Express a ridge regression on `compute_harmonic_columns`."""
+    geometry, harmonics = np.split(coefficients, [-2 * orders * joints])
+    amplitudes = harmonics.reshape(orders, 2, joints)
+    terms = [
+        Term(joint, float(amplitude), ("sin", "cos")[wave], ((joint, order + 1.0),))
+        for (order, wave, joint), amplitude in np.ndenumerate(amplitudes)
+    ]
+    return DisplacementLaw(geometry, tuple(terms))
 
 
 def _profile_likelihood(target: np.ndarray, solution: _RidgeSolution) -> float:
@@ -376,7 +394,20 @@ def fit_two_joints(
         geometric, by_pair = np.split(coefficients, [jacobian.shape[1]])
         return queries.jacobian @ geometric + columns @ by_pair
 
-    yield Predictor(mean)
+    yield Predictor(mean, law=_express_pair(coefficients, best_pair, len(joints)))
+
+
+def _express_pair(
+    coefficients: np.ndarray, pair: tuple[int, int], joints: int
+) -> DisplacementLaw:
+    """Express a ridge regression on `compute_pair_columns` of all joints."""
+    functions = compute_pair_functions(make_symbolic_angles(joints)[:, pair])[0]
+    geometry, by_pair = np.split(coefficients, [-joints * len(functions)])
+    displacements = by_pair.reshape(joints, -1) @ functions
+    terms: list[Term] = []
+    for joint, displacement in enumerate(displacements):
+        terms += list_terms(joint, displacement)
+    return DisplacementLaw(geometry, tuple(terms))
 
 
 def fit_extra_trees(
@@ -516,6 +547,16 @@ def fit_gaussian_process(
             process.mean(scaling.scale(queries)) * scaling.size + scaling.offset
         ),
         lambda queries: process.std(scaling.scale(queries))[:, None] * scaling.size,
+        ProcessLaw(
+            scaling.varying,
+            scaling.center,
+            scaling.spread,
+            hyperparameters.lengths,
+            process.points,
+            process.weights,
+            scaling.offset,
+            scaling.size,
+        ),
     )
 
 
@@ -666,24 +707,31 @@ def compute_pair_columns(
 ) -> np.ndarray:
     """Displacement of the target by functions of two joints' angles.
 
-    The functions are the products of the first harmonics of both angles, and the second
-    harmonics of each. Every one is a deviation of every joint in `displaced_joints`.
-    Returns a (M, 3, D) array.
+    Every one of `compute_pair_functions` is a deviation of every joint in
+    `displaced_joints`. Returns a (M, 3, D) array.
     """
-    angles = inputs.joint_angles[:, pair]
+    functions = compute_pair_functions(inputs.joint_angles[:, pair])
+    displacement = inputs.jacobian[:, :, displaced_joints, None]
+    count = len(displaced_joints) * functions.shape[1]
+    return (displacement * functions[:, None, None]).reshape(len(inputs), 3, count)
+
+
+def compute_pair_functions(angles: np.ndarray) -> np.ndarray:
+    """Compute functions of two angles (M, 2), (M, 13) array.
+
+    They are the products of the first harmonics of both angles, and the second harmonics
+    of each.
+    """
     first = np.stack([np.ones_like(angles), np.sin(angles), np.cos(angles)], axis=1)
     products = first[:, :, None, 0] * first[:, None, :, 1]
-    functions = np.hstack(
+    return np.hstack(
         [
             # Sizes are written out, because a size of no rows cannot be inferred.
-            products.reshape(len(inputs), products.shape[1] * products.shape[2]),
+            products.reshape(len(angles), products.shape[1] * products.shape[2]),
             np.sin(2.0 * angles),
             np.cos(2.0 * angles),
         ]
     )
-    displacement = inputs.jacobian[:, :, displaced_joints, None]
-    count = len(displaced_joints) * functions.shape[1]
-    return (displacement * functions[:, None, None]).reshape(len(inputs), 3, count)
 
 
 def _split_into_chunks(inputs: Inputs | np.ndarray) -> list[slice]:

@@ -40,6 +40,7 @@ from elastocal.validation.held_out import (
     summarize_errors,
 )
 from elastocal.validation.transfer import (
+    compute_joint_range,
     find_beyond_campaign,
     is_same_campaign,
     transfer_fit,
@@ -220,11 +221,26 @@ def find_beyond_regression(
     -------
     (N,) bool array
     """
-    low = fitted.joint_angles.min(axis=0)
-    high = fitted.joint_angles.max(axis=0)
-    middle = 0.5 * (low + high)
+    middle = _find_middle(fitted)
     shrunk = middle + (joint_angles - middle) / (1.0 + 2.0 * _RANGE_MARGIN)
     return find_beyond_campaign(fitted, shrunk, wrench)
+
+
+def compute_regression_range(fitted: States) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the lowest and the highest angle (n,) of each joint at which
+    `find_beyond_regression` still lets a regression be added."""
+    middle = _find_middle(fitted)
+    low, high = (
+        middle + (1.0 + 2.0 * _RANGE_MARGIN) * (end - middle)
+        for end in compute_joint_range(fitted)
+    )
+    return low, high
+
+
+def _find_middle(fitted: States) -> np.ndarray:
+    """Find the middle of the fitted range of each joint, (n,) array."""
+    lowest = fitted.joint_angles.min(axis=0)
+    return np.asarray(0.5 * (lowest + fitted.joint_angles.max(axis=0)))
 
 
 def fit_to_observations(
@@ -269,7 +285,8 @@ def fit_choice(
         stated = std_factor * predictor.std(queries)
         return np.where(np.isfinite(stated), stated, spread.otherwise_m)
 
-    return Predictor(mean, std)
+    law = predictor.law.scaled(shrinkage) if predictor.law else None
+    return Predictor(mean, std, law)
 
 
 def _fit_setting(
@@ -331,25 +348,35 @@ def build_inputs(
     effects = [
         (effect, shapes)
         for effect, shapes in zip(model.effects, estimate.shapes, strict=True)
-        if effect.effect in list_effects() and is_commanded(effect)
+        if _is_correctable(effect)
     ]
     if not effects or not with_jacobian:
         return inputs
-    sizes = np.array(
-        [
-            parameter.plausible
-            for effect, _ in effects
-            for parameter in effect.parameters
-        ]
-    )
     columns = compute_effect_sensitivities(
         [(effect.displacement, shapes) for effect, shapes in effects],
         evaluate_conditions(model, estimate, observations.states),
         inputs.jacobian,
         observations.state,
-        sizes / _RAD_PER_SIZE,
+        compute_effect_factors(model),
     )
     return replace(inputs, jacobian=np.concatenate([inputs.jacobian, columns], axis=2))
+
+
+def compute_effect_factors(model: Model) -> np.ndarray:
+    """Compute the factors (D,) of the effects' columns in `build_inputs`, one for each
+    parameter."""
+    sizes = [
+        parameter.plausible
+        for effect in model.effects
+        if _is_correctable(effect)
+        for parameter in effect.parameters
+    ]
+    return np.array(sizes) / _RAD_PER_SIZE
+
+
+def _is_correctable(effect: Candidate) -> bool:
+    """Whether a regression may undo what was assigned to an effect."""
+    return effect.effect in list_effects() and is_commanded(effect)
 
 
 def summarize_residual_model(

@@ -13,7 +13,11 @@ import numpy as np
 from scipy.linalg import blas
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.holdout import find_poses_beyond_range, find_repeated
+from elastocal.campaigns.holdout import (
+    compute_pose_range,
+    find_poses_beyond_range,
+    find_repeated,
+)
 from elastocal.counting import format_count
 from elastocal.effects.protocol import LOADED_JOINTS
 from elastocal.fitting.least_squares import evaluate_as_fit, fit_placement
@@ -226,9 +230,21 @@ def find_larger_loads(
     Returns a (N,) bool array.
     """
     sizes = np.linalg.norm(wrench.reshape(-1, 2, 3), axis=2)
+    return (sizes > compute_load_limits(fitted_states, times)).any(axis=1)
+
+
+def compute_load_limits(fitted_states: States, times: float = 1.0) -> np.ndarray:
+    """Compute the largest force, N, and moment, N m, that do not exceed `times` the
+    campaign's largest, (2,) array."""
     fitted_sizes = np.linalg.norm(fitted_states.wrench.reshape(-1, 2, 3), axis=2)
-    limit = (1.0 + _LOAD_ROUNDING) * times * fitted_sizes.max(axis=0) + _LOAD_ROUNDING
-    return (sizes > limit).any(axis=1)
+    limits = (1.0 + _LOAD_ROUNDING) * times * fitted_sizes.max(axis=0) + _LOAD_ROUNDING
+    return np.asarray(limits)
+
+
+def compute_joint_range(fitted_states: States) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the lowest and the highest angle (n,) of each joint beyond which
+    `find_beyond_campaign` finds a pose."""
+    return compute_pose_range(_angles_of_poses(fitted_states))
 
 
 def compute_predictive_variances(
