@@ -106,7 +106,7 @@ BYTES = Finding(
 
 def test_the_page_states_whether_all_checks_hold_and_which_files_were_not_recomputed():
     again, apart = render_page(tabulate_findings([GOOD, BYTES]), {"seed": "1"}).split(
-        "Files that were not recomputed"
+        "Files that were neither recomputed nor made again"
     )
     assert "All 2 checks hold." in again and "Failed checks" not in again
     assert (
@@ -122,4 +122,4 @@ def test_the_page_states_whether_all_checks_hold_and_which_files_were_not_recomp
         and "column &lt;dev&gt;" in text
         and "http" not in text
     )
-    assert "Files that were not recomputed" not in text
+    assert "Files that were neither recomputed nor made again" not in text

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 import yaml
 from durations import HUNG_S
-from made_audits import altered, failed
+from made_audits import altered, failed, forge
 
 from elastocal_proof.audit.audit_run import audit_run
 from elastocal_proof.audit.finished_run import FinishedRun
@@ -16,6 +16,8 @@ from elastocal_proof.audit.finished_run import FinishedRun
 pytestmark = pytest.mark.slow
 
 CAMPAIGN = "kuka_extended_end_effector"
+EVIDENCE = f"results/evidence/{CAMPAIGN}.json"
+VERDICT = f"reports/loop/{CAMPAIGN}/verdict.json"
 MEASURED = "data/simulated/kuka/200um/measured.parquet"
 IDENTIFIED, OF_STRATEGY = (
     f"results/identified/kuka/200um/{name}.parquet" for name in ("6DoF", "3+6DoF-comb")
@@ -36,11 +38,12 @@ def audited(folder):
 
 @pytest.fixture(scope="module")
 def folder(small_study, tmp_path_factory):
-    """A copy of the finished study with a campaign; each test puts back the file that
-    it changed."""
+    """A copy of the finished study with a campaign, and what the audit makes again of
+    both; each test puts back the file that it changed."""
     study = small_study.copied_to(tmp_path_factory.mktemp("audited") / "study")
     study.configure({"loop": {"campaigns": [CAMPAIGN]}})
-    study.run("reports/loop/campaigns.csv")
+    study.run("reports/loop/campaigns.csv", f"reports/loop/{CAMPAIGN}/report.pdf")
+    study.run("results/remade.json", EVIDENCE)
     return study.folder
 
 
@@ -53,6 +56,8 @@ def test_a_finished_study_holds_in_every_check(folder):
         "numpy on pinocchio",
         "statsmodels on pinocchio",
         "MuJoCo",
+        "normal density with its covariance in full",
+        "the same job, run again",
     }
     assert by <= {finding.by for finding in checks}
 
@@ -109,6 +114,58 @@ def test_one_altered_value_is_found_although_its_checksum_is_forged(
             for finding in audit_run(audited(folder), audited_files)
             if not finding.holds
         ]
+
+
+@pytest.mark.parametrize(
+    ("file", "address"),
+    [
+        ("reports/answers.json", ["needed", 0, 2]),
+        (VERDICT, ["heldout", "noise_floor_rms_m"]),
+        ("reports/tables/budget.csv", ("rms_um", 0)),
+        ("reports/tables/comparison.csv", ("ours", 1)),
+        ("results/ladder/kuka_extended.parquet", ("mean_square", 0)),
+    ],
+)
+def test_one_value_that_only_its_job_makes_again_is_found(folder, file, address):
+    def change(value):
+        return f"{value}1" if isinstance(value, str) else 1.01 * value
+
+    with altered(folder, file, address, change):
+        assert failed(audit_run(audited(folder), {file})) == ["bytes as made again"]
+
+
+def test_an_altered_probability_of_a_verdict_is_found(folder):
+    address = ["probabilities", "mechanisms", "link_elasticity"]
+    with altered(folder, VERDICT, address, lambda value: 0.99 * value):
+        failures = failed(audit_run(audited(folder), {VERDICT, EVIDENCE}))
+    assert set(failures) == {"probability of mechanisms", "bytes as made again"}
+
+
+@pytest.mark.parametrize(
+    "file",
+    [
+        "reports/figures/figure4.png",
+        "reports/figures/figure5a.pdf",
+        f"reports/loop/{CAMPAIGN}/figures/arrows.pdf",
+        f"reports/loop/{CAMPAIGN}/report.html",
+        "reports/study.pdf",
+    ],
+)
+def test_one_altered_byte_of_a_figure_or_report_is_found(folder, file):
+    path = folder / file
+    before = path.read_bytes()
+    record = folder / f"results/records/{file}.json"
+    recorded = record.read_bytes()
+    middle = len(before) // 2
+    changed = bytes([before[middle] ^ 1])
+    path.write_bytes(before[:middle] + changed + before[middle + 1 :])
+    forge(folder, file)
+    try:
+        failures = failed(audit_run(audited(folder), {file}))
+    finally:
+        path.write_bytes(before)
+        record.write_bytes(recorded)
+    assert failures == ["bytes as made again"]
 
 
 def test_a_digit_of_a_table_for_people_is_found(folder):

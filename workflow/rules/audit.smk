@@ -4,21 +4,52 @@
 hold, it also writes reports/audit.txt; otherwise it ends with an error. Finished files of other targets, such as blind, are audited too.
 """
 
-# Targets that are audited too if they have finished, with the last file of each.
-AUDITED_TOO = {
-    "study": "reports/study.pdf",
-    "loop": "reports/loop/campaigns.csv",
-    "measured": "reports/loop/measured.csv",
-    "league": "reports/league/all/league.csv",
-    "league_small": "reports/league/small/league.csv",
-    "blind": "reports/blind/summary.csv",
-    "closed_loop": "reports/closed_loop/goals.csv",
-}
+# Files that their jobs make again, byte by byte, from the files that are recomputed.
+REMADE = [
+    r"reports/figures/.*",
+    r"reports/(paper|study)\.pdf",
+    r"reports/answers\.json",
+    r"reports/tables/.*\.csv",
+    r"results/(budget|ladder|simulated_designs|studies|uses)/.*",
+    *(
+        rf"{folder}/loop/{campaign}/.*"
+        for campaign in AUDITED_CAMPAIGNS
+        for folder in ("reports", "results")
+    ),
+]
+
+
+rule remake_files:
+    input:
+        files=audited,
+    output:
+        digests="results/remade.json",
+    params:
+        remade=REMADE,
+        configuration={key: value for key, value in config.items() if key != "origin"},
+        snakefile=str(ROOT / "Snakefile"),
+        others=digest_others,
+    script:
+        "../scripts/remake_files.py"
+
+
+rule trace_evidence:
+    input:
+        descriptions=rules.read_campaign.output.descriptions,
+        training=rules.read_campaign.output.training,
+    output:
+        evidence="results/evidence/{campaign}.json",
+    params:
+        seed=config["seed"],
+    script:
+        "../scripts/trace_evidence.py"
 
 
 rule audit_files:
     input:
         files=audited,
+        evidence=evidence_of_finished,
+        remade=rules.remake_files.output.digests,
         reference=f"{CONFIG}/paper/reference.csv",
     output:
         table="reports/audit.csv",
@@ -28,11 +59,7 @@ rule audit_files:
         strategies=STUDY.strategies,
         configuration={key: config[key] for key in AUDITED_KEYS},
         rows=config["audit"]["rows"],
-        # The audit runs again after another target has finished; it does not start one.
-        others=lambda wildcards: {
-            target: compute_sha256(file) if Path(file).is_file() else ""
-            for target, file in AUDITED_TOO.items()
-        },
+        others=digest_others,
     script:
         "../scripts/audit_files.py"
 

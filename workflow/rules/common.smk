@@ -88,6 +88,9 @@ snakemake_internals.skip_unprinted_messages(workflow, "elastocal")
 ENTRIES = [entry.partition("=") for entry in snakemake_internals.config_arguments(workflow)]
 CHANGES = ["".join(entry) for entry in ENTRIES if entry[0] != "campaign"]
 
+# The audit makes files again as of the commit that their records state.
+GIVEN_ORIGIN = config.pop("origin", None)
+
 try:
     # Snakemake removes quotes and blanks at the ends of a value, so that a neighbouring folder would be diagnosed.
     for name, _, value in ENTRIES:
@@ -131,7 +134,7 @@ ORIGIN = Origin(
     digest_configuration(RESOLVED),
     config["seed"],
 )
-config["origin"] = vars(ORIGIN)
+config["origin"] = GIVEN_ORIGIN or vars(ORIGIN)
 
 NOISE = [f"{level:g}" for level in config["noise_um"]]
 TABLE_NOISE = f"{config['tables']['noise_um']:g}"
@@ -379,3 +382,37 @@ def audited(wildcards):
             )
         )
     return files_behind(rules.all.input)
+
+
+# Targets that are audited too if they have finished, with the last file of each.
+AUDITED_TOO = {
+    "study": "reports/study.pdf",
+    "loop": "reports/loop/campaigns.csv",
+    "measured": "reports/loop/measured.csv",
+    "league": "reports/league/all/league.csv",
+    "league_small": "reports/league/small/league.csv",
+    "blind": "reports/blind/summary.csv",
+    "closed_loop": "reports/closed_loop/goals.csv",
+}
+
+
+def digest_others(wildcards):
+    """Return a digest of each target, so that the audit runs again after another one has finished; it does not start one."""
+    return {
+        target: compute_sha256(file) if Path(file).is_file() else ""
+        for target, file in AUDITED_TOO.items()
+    }
+
+
+# Campaigns that are diagnosed in seconds. Those of `measured` take minutes.
+AUDITED_CAMPAIGNS = list(dict.fromkeys([*config["loop"]["main"], *config["loop"]["campaigns"]]))
+
+
+def evidence_of_finished(wildcards):
+    """Return the evidence of each campaign that is finished: the audit diagnoses it once more, but begins no other."""
+    return [
+        f"results/evidence/{campaign}.json"
+        for campaign in AUDITED_CAMPAIGNS
+        if campaign in config["loop"]["main"]
+        or Path(f"reports/loop/{campaign}/verdict.json").is_file()
+    ]

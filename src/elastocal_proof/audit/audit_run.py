@@ -18,12 +18,13 @@ from jinja2 import Environment
 
 from elastocal import __version__
 from elastocal.io.records import RECORDS, list_recorded_files
-from elastocal_proof.audit import campaigns, fits, scores, study
+from elastocal_proof.audit import campaigns, fits, probabilities, scores, study
 from elastocal_proof.audit.finished_run import Finding, FinishedRun, require
 
 _Check = Callable[..., Iterator[Finding]]
 
 _SHA = "hashlib, SHA-256"
+_SAME_JOB = "the same job, run again"
 _METADATA = "its own metadata"
 # Checks of every file, whatever its contents, in terms of `Finding.by`. All other
 # checks compute something again.
@@ -32,10 +33,14 @@ OF_EVERY_FILE = ("its record", _SHA, _METADATA)
 # arguments of the check.
 CHECKS: list[tuple[str, _Check]] = [
     item
-    for module in (study, scores, campaigns, fits)
+    for module in (study, scores, campaigns, fits, probabilities)
     for item in module.CHECKS.items()
 ]
 COLUMNS = ("file", "checked", "by", "compared", "worst", "holds", "note")
+# SHA-256 of the files that their jobs have made again, written by the rule
+# `remake_files`.
+_REMADE = "results/remade.json"
+_OF_AUDIT = ("reports/audit.", _REMADE)
 # Findings that the page shows in full.
 _MOST_SHOWN = 200
 
@@ -47,12 +52,16 @@ def audit_run(run: FinishedRun, only: Collection[str] | None = None) -> list[Fin
     does not hold.
     """
     findings = []
+    remade = run.document(_REMADE) if run.has(_REMADE) else {}
     for file, digest in list_recorded_files(run.folder).items():
-        # The output of an earlier audit is not audited by default.
-        if file in only if only is not None else not file.startswith("reports/audit."):
+        # Outputs of an earlier audit are not audited by default.
+        if file in only if only is not None else not file.startswith(_OF_AUDIT):
             findings.append(replace(check_checksum(run, file, digest), file=file))
             if run.has(file):
                 findings += _recompute(run, file)
+                if file in remade:
+                    same_bytes = check_remade(run, file, remade[file])
+                    findings.append(replace(same_bytes, file=file))
     if findings:
         return findings
     note = "none; is the run finished?"
@@ -91,8 +100,11 @@ def render_page(table: pd.DataFrame, facts: Mapping[str, str]) -> str:
     facts : head of the page, such as the seed
     """
     labelled = table.assign(kind=table["file"].map(_name_kind))
-    recomputed = labelled[~labelled["by"].isin(OF_EVERY_FILE)]
-    unchanged = labelled[~labelled["kind"].isin(recomputed["kind"])]
+    is_remade = labelled["by"] == _SAME_JOB
+    recomputed = labelled[~is_remade & ~labelled["by"].isin(OF_EVERY_FILE)]
+    remade = labelled[is_remade]
+    again = {*recomputed["kind"], *remade["kind"]}
+    unchanged = labelled[~labelled["kind"].isin(again)]
     failed = table[~table["holds"]]
     page = resources.files("elastocal_proof.audit").joinpath("audit.html")
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
@@ -100,9 +112,11 @@ def render_page(table: pd.DataFrame, facts: Mapping[str, str]) -> str:
         facts=facts,
         wrong=failed.head(_MOST_SHOWN).to_dict("records"),
         recomputed=_summarize_kinds(recomputed),
+        remade=_summarize_kinds(remade),
         rest=_summarize_kinds(unchanged),
         files=table["file"].nunique(),
         files_again=recomputed["file"].nunique(),
+        files_remade=remade["file"].nunique(),
         checks=len(table),
         values=int(table["compared"].sum()),
         failed=len(failed),
@@ -172,6 +186,14 @@ def check_checksum(run: FinishedRun, file: str, digest: str) -> Finding:
         actual == digest,
         f"{actual[:12]}, recorded {digest[:12]}",
     )
+
+
+def check_remade(run: FinishedRun, file: str, digest: str) -> Finding:
+    """Check that a file holds the bytes that its job writes when it is run again, by
+    their digest, which is empty if the job failed."""
+    actual = hashlib.sha256((run.folder / file).read_bytes()).hexdigest()
+    note = f"{actual[:12]}, made again {digest[:12] or 'in vain: its job failed'}"
+    return require("bytes as made again", _SAME_JOB, actual == digest, note)
 
 
 def check_provenance(run: FinishedRun, file: str) -> Iterator[Finding]:
