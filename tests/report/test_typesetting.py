@@ -93,26 +93,45 @@ def test_a_value_that_has_the_separator_of_cells_fills_one_cell(tmp_path, monkey
     }
 
 
-@pytest.mark.parametrize("rows", [16, 41, 43, 60])
-@pytest.mark.parametrize("offset_mm", [0, 60, 120, 150])
-def test_a_table_that_breaks_leaves_no_fewer_than_three_rows_on_a_page(
-    rows, offset_mm, tmp_path
-):
+@pytest.fixture
+def count_rows(tmp_path):
+    """Counts the rows of a table on each page, below a gap; `words` fill a row."""
     for file in resources.files("elastocal.report").iterdir():
         if file.name == "sheet.typ":
             (tmp_path / "sheet.typ").write_bytes(file.read_bytes())
     (tmp_path / "origin.json").write_text('""', encoding="utf-8")
-    document = tmp_path / "table.typ"
-    document.write_text(
-        f"""#import "sheet.typ": *
+
+    def count(rows, offset_mm, words="1"):
+        document = tmp_path / "table.typ"
+        document.write_text(
+            f"""#import "sheet.typ": *
 #show: sheet.with("table")
 // Each row says on which page it stands.
-#show regex("row \\\\d+"): it => [#it #context [#metadata(here().page())<page>]]
+#show regex("row \\d+"): it => [#it #context [#metadata(here().page())<page>]]
 #v({offset_mm}mm)
-#records((1fr, 1fr), ("a", "b"), range({rows}).map(i => ("row " + str(i), "1")), [c])
+#let rows = range({rows}).map(i => ("row " + str(i), "{words}"))
+#records((1fr, 1fr), ("a", "b"), rows, [c])
 """,
-        encoding="utf-8",
-    )
-    pages = json.loads(typst.query(document, "<page>", field="value"))
-    assert len(pages) == rows
-    assert min(Counter(pages).values()) >= 3
+            encoding="utf-8",
+        )
+        pages = json.loads(typst.query(document, "<page>", field="value"))
+        assert len(pages) == rows
+        return Counter(pages)
+
+    return count
+
+
+@pytest.mark.parametrize("rows", [16, 41, 43, 60])
+@pytest.mark.parametrize("offset_mm", [0, 60, 120, 150])
+def test_a_table_that_breaks_leaves_no_fewer_than_three_rows_on_a_page(
+    rows, offset_mm, count_rows
+):
+    assert min(count_rows(rows, offset_mm).values()) >= 3
+
+
+@pytest.mark.parametrize("rows", [4, 5])
+@pytest.mark.parametrize("offset_mm", [150, 190])
+def test_a_table_of_few_rows_with_long_texts_stays_on_one_page(
+    rows, offset_mm, count_rows
+):
+    assert len(count_rows(rows, offset_mm, words=60 * "word ")) == 1
