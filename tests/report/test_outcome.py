@@ -1,8 +1,10 @@
 """The terminal names each report and states the verdict on a campaign."""
 
+from dataclasses import replace
+
 from made_loop_tables import CAMPAIGNS
 
-from elastocal.report.outcome import describe_outcome
+from elastocal.report.outcome import describe_outcome, describe_verdict
 from elastocal.verdict import write_verdict
 
 
@@ -36,4 +38,22 @@ def test_the_outcome_names_reports_and_verdicts(tmp_path):
     )
     assert lines["named"][-1] == (
         "next: elastocal correct 'my cells/cell7' path.csv --output targets.csv"
+    )
+
+
+def test_each_warning_of_a_diagnosis_is_a_line():
+    """A fit that did not converge, rows that were left out, and effects that made the
+    errors of validation poses larger."""
+    warnings = (
+        "the fit of the final model did not converge",
+        "row 7 lies 3.1 mm off the model and was left out",
+        "the RMS error of the validation poses grew from 0.100 to 0.120 mm",
+    )
+    verdict = replace(CAMPAIGNS["named"], warnings=warnings)
+    *_, first, second, third = describe_verdict("cell7", verdict)
+    assert first == "! The fit of the final model did not converge."
+    assert second == "! Row 7 lies 3.1 mm off the model and was left out."
+    assert third.endswith("grew from 0.100 to 0.120 mm.")
+    assert not any(
+        line.startswith("! ") for line in describe_verdict("cell7", CAMPAIGNS["named"])
     )

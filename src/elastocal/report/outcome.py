@@ -54,20 +54,18 @@ def describe_outcome(
 
 
 def describe_verdict(name: str, verdict: Verdict) -> list[str]:
-    """Describe the verdict on a campaign of this name, and its errors, in lines."""
+    """Describe the verdict on a campaign of this name, its errors and its warnings, in
+    lines."""
     # Import the templates only here, because a run without a report does not need them.
     from elastocal.report.loop_facts import render_campaign_sentences
 
     stated = render_campaign_sentences(verdict)
     mark = "✓" if _is_correctable(verdict) else "!"
-    not_converged = [
-        f"! {warning}" for warning in verdict.warnings if "did not converge" in warning
-    ]
     return [
         f"{mark} {name}: {stated['sentences'][0]}",
         *(f"  {line}" for line in stated["headline_line"]),
         *(f"  {line}" for line in stated["left_out"]),
-        *not_converged,
+        *(f"! {warning}" for warning in stated["warnings"]),
     ]
 
 
