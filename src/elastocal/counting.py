@@ -1,4 +1,4 @@
-"""Format counts with their nouns for messages and reports."""
+"""Format numbers, and counts with their nouns, for messages and reports."""
 
 from __future__ import annotations
 
@@ -25,6 +25,12 @@ def pluralize(singular: str, number: int, plural: str | None = None) -> str:
     if number == 1:
         return singular
     return plural or f"{singular}s"
+
+
+def format_digits(value: float, digits: int) -> str:
+    """Return a number with so many significant digits; no exponent follows unless the
+    number is small: 100, not 1e+02."""
+    return f"{float(f'{value:.{digits}g}'):.12g}"
 
 
 def format_integer(number: int) -> str:

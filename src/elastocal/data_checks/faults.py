@@ -15,6 +15,7 @@ import numpy as np
 from scipy.constants import g, pound_force
 
 from elastocal.campaigns.campaign import group_equal_rows
+from elastocal.counting import format_digits
 from elastocal.data_checks.hypotheses import find_better_interpretation
 from elastocal.data_checks.placement import (
     IMPLAUSIBLE_M,
@@ -422,9 +423,9 @@ def warn_of_compliances(fitted: Fit) -> list[str]:
     is_far &= np.abs(compliance - nominal) > _NEGATIVE_STD_ERRORS * std_error
     joints = [
         f"joint {joint + 1} {'below ' if is_negative[joint] else ''}"
-        f"{_format_digits(1e6 * compliance[joint], 3)}"
-        f" ± {_format_digits(1e6 * std_error[joint], 2)}"
-        f" ({reference} {_format_digits(1e6 * nominal[joint], 3)})"
+        f"{format_digits(1e6 * compliance[joint], 3)}"
+        f" ± {format_digits(1e6 * std_error[joint], 2)}"
+        f" ({reference} {format_digits(1e6 * nominal[joint], 3)})"
         for joint in np.flatnonzero(is_identified & (is_far | is_negative))
     ]
     if not joints:
@@ -445,10 +446,3 @@ def warn_of_computed_positions(campaign: Campaign) -> list[str]:
         " nearer than any robot goes: a controller worked them out of the joint angles;"
         " they are no measurements, and show nothing of the robot"
     ]
-
-
-def _format_digits(value: float, digits: int) -> str:
-    """Format a number with so many significant digits and without an exponent."""
-    return np.format_float_positional(
-        value, precision=digits, fractional=False, trim="-"
-    )

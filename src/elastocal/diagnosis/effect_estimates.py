@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.counting import pluralize
+from elastocal.counting import format_digits, pluralize
 from elastocal.data_checks.protocol import DATA_FAMILY, Fault
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.verdict import (
@@ -335,7 +335,8 @@ def warn_of_implausible_values(fitted: Fit, keys: Sequence[str]) -> list[str]:
     for key in keys:
         estimates = _generate_estimates(fitted, effects_by_key[key])
         for value, std_error, parameter in estimates:
-            estimate = f"{key}: {parameter.name} is {value:.3g} ± {std_error:.2g} {parameter.unit}"
+            size = f"{format_digits(value, 3)} ± {format_digits(std_error, 2)}"
+            estimate = f"{key}: {parameter.name} is {size} {parameter.unit}"
             if parameter.sign * value < -_STD_ERRORS * std_error:
                 sign = "positive" if parameter.sign > 0 else "negative"
                 warnings.append(f"{estimate}, and by its physics {sign}")

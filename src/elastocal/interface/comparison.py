@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from elastocal.counting import format_digits
 from elastocal.errors import InputError
 from elastocal.interface.diagnoses import DiagnosisResult
 
@@ -117,6 +118,7 @@ def _describe_verdict(verdict: Verdict) -> dict[str, str]:
 
 def _format_parameter(parameter: EffectParameter) -> str:
     """Format a value with its standard error."""
+    value = format_digits(parameter.value, 4)
     if parameter.std_error is None:
-        return f"{parameter.value:.4g}"
-    return f"{parameter.value:.4g} ± {parameter.std_error:.2g}"
+        return value
+    return f"{value} ± {format_digits(parameter.std_error, 2)}"
