@@ -3,6 +3,7 @@ form that hosts ask for, one way out."""
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -161,3 +162,22 @@ def test_every_figure_of_the_paper_is_one_of_a_page():
         for page, quotation in quotations
         if quotation not in text(page)
     ] == []
+
+
+def test_an_older_python_is_refused_in_a_line_before_anything_is_installed(tmp_path):
+    """A resolver would say that some package has no version for it."""
+    shutil.copy(ROOT / "Makefile", tmp_path)
+    shutil.copytree(ROOT / "requirements", tmp_path / "requirements")
+    older = tmp_path / "python3.10"
+    older.write_text(
+        f"""#!/bin/sh
+exec {sys.executable} -c "import sys; sys.version_info = (3, 10, 12); $2"
+""",
+        encoding="utf-8",
+    )
+    older.chmod(0o755)
+    command = ["make", f"PYTHON={older}", ".venv/made"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    line = "elastocal needs Python 3.11 or later, and this is Python 3.10"
+    assert done.returncode != 0 and line in done.stderr
+    assert not (tmp_path / ".venv").exists()

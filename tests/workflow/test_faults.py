@@ -92,6 +92,7 @@ def test_spoilt_data_end_the_job_that_reads_them_and_deleted_ones_are_made_again
         " allowed: the file as the pipeline wrote it"
     )
     assert ended.stderr.splitlines()[-1] == line and "Traceback" not in ended.stderr
+    assert (ended.stdout + ended.stderr).count(line) == 1
     assert finished_paper.files(IDENTIFIED, "results/identified/**/*.partial") == []
     finished_paper.path(MEASURED).unlink()
     assert ("measure", "kuka", "200") in finished_paper.planned(PAPER)
