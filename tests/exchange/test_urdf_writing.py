@@ -1,8 +1,12 @@
 """Calibrated joint origins in the user's own URDF, against pinocchio."""
 
+from dataclasses import replace
 from xml.etree import ElementTree as Xml
 
+import numpy as np
+import pinocchio as pin
 import pytest
+from analysed_robots import analysed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_calibrated import make_calibrated_robot
@@ -12,7 +16,8 @@ from support import refused
 from elastocal.application.exported import fold_effects
 from elastocal.effects.catalogue import candidates_on
 from elastocal.exchange.urdf import robot_from_urdf
-from elastocal.exchange.urdf_writing import write_calibrated_origins
+from elastocal.exchange.urdf_writing import build_urdf, write_calibrated_origins
+from elastocal.mechanics.kinematics import compute_poses
 from elastocal.mechanics.sites import build_sites
 
 # With what people have in their files: comments, meshes, other programs' elements, a
@@ -146,4 +151,35 @@ def test_any_chain_moves_as_its_calibrated_robot(tmp_path_factory, parts, seed):
         "tip",
         count=3,
         within=1e-8,
+    )
+
+
+@pytest.mark.parametrize("name", ["kuka", "gen3", "motoman_right_arm"])
+def test_a_new_urdf_has_the_poses_of_the_calibrated_robot(name, tmp_path):
+    """Read by this package, and by pinocchio, which shares no code with it."""
+    nominal = analysed(name)
+    offset = np.linspace(1e-3, 5e-3, nominal.joints)
+    calibrated = replace(nominal, reported_offset=nominal.reported_offset + offset)
+    path = tmp_path / "arm.urdf"
+    path.write_text(build_urdf(nominal, calibrated), "utf-8")
+    tip = calibrated.chain.end_effector.name
+    stream = np.random.default_rng(1)
+    reported = stream.uniform(-1.0, 1.0, (5, nominal.joints))
+    values = nominal.model_angles(reported)
+    expected, _ = compute_poses(
+        calibrated.chain,
+        calibrated.model_angles(reported),
+        calibrated.chain.end_effector,
+    )
+    read = robot_from_urdf(path, "base_link", tip).robot
+    position, _ = compute_poses(read.chain, values, read.chain.end_effector)
+    np.testing.assert_allclose(position, expected, atol=1e-9)
+    model = pin.buildModelFromUrdf(str(path))
+    data = model.createData()
+    for row, place in zip(values, expected, strict=True):
+        pin.framesForwardKinematics(model, data, row)
+        reached = data.oMf[model.getFrameId(tip)].translation
+        np.testing.assert_allclose(reached, place, atol=1e-9)
+    assert sum(m.mass_kg for m in read.masses) == pytest.approx(
+        sum(m.mass_kg for m in nominal.masses)
     )

@@ -114,3 +114,31 @@ def write_made_model(path, calibrated):
     """Write the model file of such a robot."""
     write_model(path, describe_model(calibrated, CAMPAIGNS["named"]))
     return path
+
+
+def calibrate_exactly(robot, *keys, seed=3):
+    """Make a calibrated robot with effects of these keys and its compliances, from a
+    campaign in its base frame."""
+    sites = build_sites(robot)
+    catalogue = candidates_on(sites)
+    effects = [joint_compliance(sites)]
+    if sites.masses:
+        effects.append(declared_weight(sites))
+    effects += [catalogue[key] for key in keys]
+    model = Model(
+        sites,
+        (Target("A", sites.chain.end_effector.name, (0.0, 0.0, 0.0)),),
+        fitted_frames=False,
+        rows=3,
+        nominal_compliance=robot.compliance,
+        effects=tuple(effects),
+    )
+    estimate = make_estimate(model, seed=seed, size=0.3)
+    coefficients = (robot.compliance, *estimate.coefficients[1:])
+    estimate = replace(estimate, coefficients=coefficients)
+    states = make_states(robot.joints, STATES, seed, force=100.0, span=1.5)
+    observations = observe_exactly(model, estimate, states)
+    covariance = 1e-12 * np.eye(len(list_parameters(model, estimate)))
+    fit = CampaignFit(model, estimate, covariance, observations)
+    noise = Noise("declared", 6e-5, 6e-5, np.full(robot.joints, 1e-5))
+    return calibrate_by_campaign_fit(robot, fit, noise, None, 0.0)

@@ -3,6 +3,7 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
+import yaml
 from scipy.spatial.transform import Rotation
 
 import elastocal as ec
@@ -135,3 +136,27 @@ def test_another_file_is_no_model(tmp_path):
     path.write_text("[]", "utf-8")
     with pytest.raises(ec.InputError, match="no model file"):
         ec.read_model(path)
+
+
+def test_a_new_urdf_needs_no_original(result, nominal, commands, tmp_path):
+    path = tmp_path / "arm.urdf"
+    assert result.robot.to_urdf(path) == 7
+    robot = ec.read_robot(path, base="base_link", tip="tool")
+    position, _ = compute_poses(robot.chain, commands, robot.chain.end_effector)
+    np.testing.assert_allclose(position, result.robot.predict(commands)[0], atol=1e-9)
+
+
+def test_a_model_of_mujoco_holds_the_wrong_zero(result, tmp_path):
+    path = tmp_path / "arm.xml"
+    assert result.robot.to_mjcf(path) == ()
+    assert "<mujoco" in path.read_text("utf-8")
+
+
+def test_a_kinematics_file_of_another_robot_is_refused(result, tmp_path):
+    original = tmp_path / "kinematics.yaml"
+    zero = dict.fromkeys(("x", "y", "z", "roll", "pitch", "yaw"), 0.0)
+    document = {f"joint{number}": {"kinematic": zero} for number in range(1, 9)}
+    original.write_text(yaml.safe_dump(document), "utf-8")
+    with pytest.raises(ec.InputError, match="another robot"):
+        result.robot.to_kinematics_file(tmp_path / "new.yaml", original)
+    assert not (tmp_path / "new.yaml").exists()

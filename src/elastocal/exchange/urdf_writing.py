@@ -8,6 +8,8 @@ goes into the last fixed joint. Joint values mean the same before and after. A U
 rigid, so compliances are not in it.
 """
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
@@ -27,13 +29,17 @@ from elastocal.exchange.urdf import LARGEST_BYTES, Joint, Urdf, find_chain, read
 from elastocal.io.storage import Columns
 from elastocal.io.texts import read_bytes
 from elastocal.mechanics.chain import Chain, Transform, parse_chain
-from elastocal.mechanics.robot import Robot
+from elastocal.mechanics.robot import Mass, Robot
 
 # Upper bound on the difference of equal transforms, m and rad: rounding in a file or in a
 # product of transforms.
 _ROUNDING = 1e-9
 # Decimals of written origins, m and rad; smaller changes of an origin are not written.
 _DECIMALS = 12
+# Effort (N m) and velocity (rad/s) that a URDF must state and no arm exceeds.
+_UNKNOWN = "1e6"
+# Density of aluminium, kg/m³.
+_DENSITY = 2700.0
 _IMPORTED_URDF = "the URDF from which the robot file was imported"
 
 
@@ -55,7 +61,7 @@ class CorrectedUrdf:
 
 
 @dataclass(frozen=True)
-class _RigidLinks:
+class RigidLinks:
     """A chain as transforms that move and fixed transforms between them.
 
     Attributes
@@ -135,15 +141,16 @@ def _has_chain(urdf: Urdf, base: str, tip: str, robot: Robot, source: str) -> bo
     joint_names = tuple(joint.name for joint in urdf_chain.joints)
     if robot.joint_names and robot.joint_names != joint_names:
         return False
-    links = _split_chain(chain)
-    robot_links = _split_chain(robot.chain)
+    links = split_chain(chain)
+    robot_links = split_chain(robot.chain)
     return links.moving == robot_links.moving and bool(
         np.abs(np.subtract(links.fixed, robot_links.fixed)).max() < _ROUNDING
     )
 
 
-def _split_chain(chain: Chain) -> _RigidLinks:
-    links = _RigidLinks([], [np.eye(4)])
+def split_chain(chain: Chain) -> RigidLinks:
+    """Split a chain into transforms that move and fixed transforms between them."""
+    links = RigidLinks([], [np.eye(4)])
     for transform in chain.transforms:
         if transform.coordinate is None:
             links.fixed[-1] = links.fixed[-1] @ make_elementary_transform(
@@ -160,9 +167,9 @@ def _correct_origins(
 ) -> dict[str, np.ndarray]:
     """Correct the origins (4, 4) of the joints of a path; return those that differ, by
     the name of the joint."""
-    nominal_links = _split_chain(nominal.chain)
-    calibrated_fixed = _split_chain(calibrated.chain).fixed
-    offset = _offset_at_zero(nominal, calibrated)
+    nominal_links = split_chain(nominal.chain)
+    calibrated_fixed = split_chain(calibrated.chain).fixed
+    offset = find_offset_at_zero(nominal, calibrated)
     origins = {}
     frame = np.eye(4)
     number = 0
@@ -187,11 +194,99 @@ def _correct_origins(
     return origins
 
 
-def _offset_at_zero(nominal: Robot, calibrated: Robot) -> np.ndarray:
+def find_offset_at_zero(nominal: Robot, calibrated: Robot) -> np.ndarray:
     """Angles of the calibrated robot at which those of the nominal robot are zero,
     ndarray (n,): the joint values of the URDF are the nominal angles."""
     factor = calibrated.reported_matrix @ np.linalg.inv(nominal.reported_matrix)
     return calibrated.reported_offset - factor @ nominal.reported_offset
+
+
+def build_urdf(nominal: Robot, calibrated: Robot) -> str:
+    """Build a URDF of a calibrated robot that was not imported from one.
+
+    Its joints have the names of the robot, or ``joint1`` and so on, and values that mean
+    the angles of the nominal chain. The base is ``base_link``; the last link has the name
+    of the last measuring point. Factors and couplings of joint values have no place in it.
+    """
+    root = ElementTree.Element("robot", name=format_point_name(calibrated.name))
+    links = split_chain(calibrated.chain)
+    offset = find_offset_at_zero(nominal, calibrated)
+    masses = {mass.link: mass for mass in calibrated.masses}
+    parent = _add_link(root, "base_link", masses.get(0))
+    names = calibrated.joint_names or _number_joints(calibrated.joints)
+    for number, moving in enumerate(links.moving):
+        child = _add_link(root, f"link{number + 1}", masses.get(number + 1))
+        shift = moving.sign * offset[number]
+        change = make_elementary_transform(moving.kind, moving.axis, shift)
+        origin = links.fixed[number] @ change
+        kind = "revolute" if moving.kind == "R" else "prismatic"
+        joint = _add_joint(root, names[number], kind, (parent, child), origin)
+        _limit_motion(joint, moving, nominal.joint_limits[number])
+        parent = child
+    end = calibrated.chain.end_effector
+    tip = _add_link(root, format_point_name(end.name), None)
+    origin = links.fixed[-1] @ make_transform(np.eye(3), end.offset_m)
+    _add_joint(root, f"{parent}_to_{tip}", "fixed", (parent, tip), origin)
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _add_link(root: ElementTree.Element, name: str, mass: Mass | None) -> str:
+    """Add a link with its weight, if it is known; return its name."""
+    link = ElementTree.SubElement(root, "link", name=name)
+    if mass is not None and mass.mass_kg > 0.0:
+        inertial = ElementTree.SubElement(link, "inertial")
+        ElementTree.SubElement(inertial, "origin", xyz=_format_numbers(mass.centre_m))
+        ElementTree.SubElement(inertial, "mass", value=repr(float(mass.mass_kg)))
+        moment = repr(estimate_inertia(mass.mass_kg))
+        moments = dict.fromkeys(("ixx", "iyy", "izz"), moment)
+        products = dict.fromkeys(("ixy", "ixz", "iyz"), "0")
+        ElementTree.SubElement(inertial, "inertia", moments | products)
+    return name
+
+
+def _add_joint(
+    root: ElementTree.Element,
+    name: str,
+    kind: str,
+    ends: tuple[str, str],
+    origin: np.ndarray,
+) -> ElementTree.Element:
+    """Add a joint between two links."""
+    joint = ElementTree.SubElement(root, "joint", name=name, type=kind)
+    roll_pitch_yaw = np.array(compute_yaw_pitch_roll(origin[:3, :3]))[::-1]
+    ElementTree.SubElement(
+        joint,
+        "origin",
+        xyz=_format_numbers(origin[:3, 3]),
+        rpy=_format_numbers(roll_pitch_yaw),
+    )
+    for role, link in zip(("parent", "child"), ends, strict=True):
+        ElementTree.SubElement(joint, role, link=link)
+    return joint
+
+
+def _number_joints(joints: int) -> tuple[str, ...]:
+    return tuple(f"joint{number}" for number in range(1, joints + 1))
+
+
+def _limit_motion(
+    joint: ElementTree.Element, moving: Transform, limits: np.ndarray
+) -> None:
+    """Add axis and limits (2,) of a joint that moves."""
+    axis = moving.sign * np.eye(3)[moving.axis]
+    ElementTree.SubElement(joint, "axis", xyz=_format_numbers(axis))
+    low, high = map(repr, limits.tolist())
+    ElementTree.SubElement(
+        joint, "limit", lower=low, upper=high, effort=_UNKNOWN, velocity=_UNKNOWN
+    )
+
+
+def estimate_inertia(mass_kg: float) -> float:
+    """Estimate the moment of inertia of a body whose mass alone is known, kg m²: that of
+    a ball of aluminium."""
+    radius = (0.75 * mass_kg / (math.pi * _DENSITY)) ** (1.0 / 3.0)
+    return float(0.4 * mass_kg * radius**2)
 
 
 def _replace_origins(content: bytes, origins: Columns) -> bytes:
@@ -212,5 +307,5 @@ def _replace_origins(content: bytes, origins: Columns) -> bytes:
     return xml + b"\n"
 
 
-def _format_numbers(values: np.ndarray) -> str:
+def _format_numbers(values: Sequence[float] | np.ndarray) -> str:
     return " ".join(repr(round(float(value), _DECIMALS) + 0.0) for value in values)

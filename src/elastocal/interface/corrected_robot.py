@@ -15,6 +15,7 @@ from elastocal.application.accuracy import (
 )
 from elastocal.application.calibrated import CalibratedRobot, predict_poses
 from elastocal.application.exported import fold_effects, write_robot_file
+from elastocal.application.mjcf import build_mjcf
 from elastocal.application.model_file import (
     describe_model,
     read_model_file,
@@ -24,14 +25,19 @@ from elastocal.application.model_file import (
 from elastocal.application.path_correction import CorrectedPath, correct_path
 from elastocal.campaigns.measurements import ROTATION
 from elastocal.errors import InputError
+from elastocal.exchange.makers_kinematics import (
+    correct_makers_file,
+    find_deviation_m,
+    read_makers_file,
+)
 from elastocal.exchange.target_path import (
     TargetPath,
     build_target_path,
     read_target_path_for,
 )
-from elastocal.exchange.urdf_writing import write_calibrated_origins
+from elastocal.exchange.urdf_writing import build_urdf, write_calibrated_origins
 from elastocal.interface.arrays import check_array
-from elastocal.io.atomic_writes import write_atomically
+from elastocal.io.atomic_writes import write_atomically, write_text
 from elastocal.loop.calibrated_files import decide_by_prediction
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.validation.conformity import Conformity, list_shortfalls
@@ -185,14 +191,62 @@ class CorrectedRobot:
         effects = self.calibrated.model.effects
         return tuple(effects[number].key for number in folded.left_out)
 
-    def to_urdf(self, path: str | Path, original: str | Path) -> int:
-        """Write the URDF `original` with calibrated joint origins; return how many were
-        changed. A URDF holds the geometry alone."""
+    def to_urdf(self, path: str | Path, original: str | Path | None = None) -> int:
+        """Write a URDF, which holds the geometry alone.
+
+        Parameters
+        ----------
+        path : str or path
+            The URDF.
+        original : str or path, optional
+            The URDF from which the robot was read, of which only joint origins change.
+            Without it a new one is written, with links without shapes.
+
+        Returns
+        -------
+        int
+            Number of joint origins that were changed or written.
+        """
         folded = fold_effects(self.calibrated)
+        if original is None:
+            write_text(path, build_urdf(self.nominal, folded.robot))
+            return self.nominal.joints + 1
         corrected = write_calibrated_origins(original, self.nominal, folded.robot)
         with write_atomically(path) as partial:
             Path(partial).write_bytes(corrected.content)
         return corrected.changed
+
+    def to_kinematics_file(self, path: str | Path, original: str | Path) -> float:
+        """Write the geometry as the kinematics file of a maker.
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
+        original : str or path
+            Kinematics file of the same robot: ``calibration.yaml`` of the ROS drivers of
+            Universal Robots, or ``kinematics.yaml`` of franka_description. The frames of
+            its links and its hash are kept.
+
+        Returns
+        -------
+        float
+            Largest distance of the file's poses from those of the calibrated geometry, m:
+            ratios of joints, and at Universal Robots an error behind the last joint,
+            have no place in it.
+        """
+        made = read_makers_file(original)
+        robots = (self.nominal, fold_effects(self.calibrated).robot)
+        write_text(path, correct_makers_file(made, *robots))
+        return find_deviation_m(read_makers_file(path), made, robots)
+
+    def to_mjcf(self, path: str | Path) -> tuple[str, ...]:
+        """Write a model of MuJoCo: springs of the joints as servos, those of base,
+        bearings and flange as passive joints, weights as bodies; return the names of the
+        effects that no rigid body has."""
+        exported = build_mjcf(describe_model(self.calibrated, self.verdict))
+        write_text(path, exported.text)
+        return exported.left_out
 
     def _check_commands(
         self, joint_angles: ArrayLike, wrenches: ArrayLike | None
