@@ -83,14 +83,23 @@ dist: .venv/ready
 	rm -rf dist
 	$(BIN)/uv build -q --no-build-isolation --python $(BIN)/python --out-dir dist
 
-# The whole way in a fresh environment without the checkout: the wheel with the lowest or the highest versions that pyproject.toml
-# allows, by an interpreter: make installed RESOLUTION=highest INTERPRETER=3.13
+# Two fresh environments with the lowest or the highest versions that pyproject.toml allows, by an interpreter:
+# make installed RESOLUTION=highest INTERPRETER=3.13
+# First the source archive with the base requirements, from arrays to corrected targets; then the wheel with all, the whole way
+# without the checkout.
 RESOLUTION ?= lowest-direct
 INTERPRETER ?= $(PYTHON)
 installed: dist
 	rm -rf .installed
+	$(BIN)/uv venv -q --python $(INTERPRETER) .installed/base
+	$(BIN)/uv pip compile -q --system-certs --resolution $(RESOLUTION) --python .installed/base/bin/python pyproject.toml \
+	    -o .installed/base.txt
+	$(BIN)/uv pip install -q --system-certs --python .installed/base/bin/python -r .installed/base.txt
+	$(BIN)/uv pip install -q --system-certs --no-deps --python .installed/base/bin/python dist/*.tar.gz
+	OMP_NUM_THREADS=1 .installed/base/bin/python workflow/examples/five_lines.py
 	$(BIN)/uv venv -q --python $(INTERPRETER) .installed/env
-	$(BIN)/uv pip compile -q --system-certs --resolution $(RESOLUTION) --python .installed/env/bin/python pyproject.toml -o .installed/versions.txt
+	$(BIN)/uv pip compile -q --system-certs --resolution $(RESOLUTION) --python .installed/env/bin/python pyproject.toml --extra proof \
+	    -o .installed/versions.txt
 	$(BIN)/uv pip install -q --system-certs --python .installed/env/bin/python -r .installed/versions.txt
 	$(BIN)/uv pip install -q --no-deps --python .installed/env/bin/python dist/*.whl
 	work="$$(mktemp -d)" && cd "$$work" && OMP_NUM_THREADS=1 "$(CURDIR)/.installed/env/bin/elastocal" demo && rm -r "$$work"
@@ -103,7 +112,8 @@ supply: .venv/ready .venv-supply/ready
 # New pins. The index is the caller's own; none is written into the lock files.
 lock:
 	uv pip compile --group install --universal --python-version 3.11 --generate-hashes --no-header -o requirements/install.lock
-	uv pip compile pyproject.toml --extra build --universal --python-version 3.11 --generate-hashes --no-header -o requirements/run.lock
+	uv pip compile pyproject.toml --extra build --extra proof --universal --python-version 3.11 --generate-hashes --no-header \
+	    -o requirements/run.lock
 	uv pip compile pyproject.toml --extra build --extra audit --universal --python-version 3.11 --generate-hashes --no-header \
 	    -c requirements/run.lock -o requirements/audit.lock
 	uv pip compile pyproject.toml --extra build --extra cluster --universal --python-version 3.11 --generate-hashes --no-header \

@@ -11,6 +11,7 @@ from elastocal.errors import (
     InputError,
     describe_system_fault,
     escape_control_characters,
+    explain_missing_packages,
     find_control_character,
     suggest_names,
 )
@@ -108,3 +109,18 @@ def test_the_first_control_character_is_found_and_escaped(text, character):
 )
 def test_a_fault_of_the_machine_is_one_line_with_a_remedy(error, phrase):
     assert phrase in str(describe_system_fault(error, "here"))
+
+
+def test_a_missing_package_of_an_extra_is_explained():
+    missing = ModuleNotFoundError("no typst", name="typst.sub")
+    with (
+        pytest.raises(InputError, match=r"no package typst.*elastocal\[report\]"),
+        explain_missing_packages(),
+    ):
+        raise missing
+
+
+def test_another_missing_package_is_left_to_the_caller():
+    missing = ModuleNotFoundError("no numpy", name="numpy")
+    with pytest.raises(ModuleNotFoundError), explain_missing_packages():
+        raise missing

@@ -6,10 +6,11 @@ import difflib
 import errno
 import re
 import unicodedata
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Iterator
     from pathlib import Path
 
 
@@ -26,6 +27,19 @@ _FORMULA = tuple("=+-@＝＋－＠")
 _PARTIAL = re.compile(r"\.[0-9a-f]{16}\.partial\b.*")
 # Messages of the loader of shared libraries if memory is used up.
 _NO_MEMORY = ("failed to map segment", "annot allocate memory")
+# Packages that only some functions need, with the extra of pyproject.toml that installs
+# them.
+EXTRAS = {
+    "matplotlib": "report",
+    "tabulate": "report",
+    "typst": "report",
+    "grimp": "pipeline",
+    "pooch": "pipeline",
+    "snakemake": "pipeline",
+    "mujoco": "proof",
+    "statsmodels": "proof",
+    "pinocchio": "audit",
+}
 _USABLE = (
     "a file or folder that is there, on a disk with space, where this user may read "
     "and write"
@@ -134,10 +148,33 @@ def describe_system_fault(
         return InputError("memory", "", "none left", allowed)
     if isinstance(error, ImportError):
         allowed = "an environment with every package of this version"
-        return InputError("Python", "", str(error), allowed)
+        missing = describe_missing_package(error)
+        return missing or InputError("Python", "", str(error), allowed)
     # Name the file that was asked for, not the temporary name of an atomic write.
     path = _PARTIAL.sub("", str(error.filename or place))
     return InputError(path, "", describe_os_error(error), _USABLE)
+
+
+def describe_missing_package(error: ImportError) -> InputError | None:
+    """Return the InputError that names the extra of a package that is not installed;
+    None if the package belongs to no extra."""
+    package = (error.name or "").partition(".")[0]
+    if package not in EXTRAS:
+        return None
+    allowed = f"an environment with it: pip install 'elastocal[{EXTRAS[package]}]'"
+    return InputError("Python", "", f"no package {package}", allowed)
+
+
+@contextmanager
+def explain_missing_packages() -> Iterator[None]:
+    """Raise an InputError if a package of an extra is not installed."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        explained = describe_missing_package(error)
+        if explained is None:
+            raise
+        raise explained from error
 
 
 def describe_os_error(error: OSError) -> str:

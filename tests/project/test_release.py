@@ -101,7 +101,7 @@ def test_every_file_has_the_version_and_the_licence_of_the_package():
     )
 
 
-def test_the_recipe_has_the_version_and_the_requirements_of_the_wheel():
+def test_the_recipe_has_the_version_and_all_requirements_of_a_checkout():
     recipe = yaml.safe_load(text("recipe/recipe.yaml"))
     assert recipe["context"]["version"] == elastocal.__version__
     run = dict(
@@ -110,7 +110,11 @@ def test_the_recipe_has_the_version_and_the_requirements_of_the_wheel():
         if isinstance(line, str) and " " in line
     )
     assert run.pop("python") == PROJECT["requires-python"]
-    requirements = map(Requirement, PROJECT["dependencies"])
+    extras = PROJECT["optional-dependencies"]
+    texts = [*PROJECT["dependencies"]]
+    for extra in ("report", "pipeline", "proof"):
+        texts += [text for text in extras[extra] if not text.startswith("elastocal[")]
+    requirements = map(Requirement, texts)
     assert run == {
         CONDA.get(requirement.name, requirement.name): str(requirement.specifier)
         for requirement in requirements

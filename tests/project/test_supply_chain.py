@@ -10,6 +10,8 @@ import pytest
 import yaml
 from packaging.requirements import Requirement
 
+from elastocal import errors
+
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))[
     "project"
@@ -27,6 +29,9 @@ RUN = [
     *ROOT.glob("workflow/scripts/*.py"),
 ]
 AUDIT = [path for path in RUN if "audit" in path.parts]
+EXTRAS = PROJECT["optional-dependencies"]
+# Extras of what a checkout runs, beside the base requirements.
+RUN_EXTRAS = ("report", "pipeline", "proof")
 # What pandas writes Markdown by.
 IMPORTED_BY_OTHERS = {"tabulate"}
 # It is where its package's own list of modules does not have it.
@@ -34,7 +39,12 @@ DISTRIBUTIONS = packages_distributions() | {"pinocchio": ["pin"]}
 
 
 def names(requirements):
-    return {Requirement(text).name.lower() for text in requirements}
+    return {Requirement(text).name.lower() for text in requirements} - {"elastocal"}
+
+
+REQUIRED = names(PROJECT["dependencies"]).union(
+    *(names(EXTRAS[extra]) for extra in RUN_EXTRAS)
+)
 
 
 def imported(paths):
@@ -59,22 +69,28 @@ def imported(paths):
 def test_what_every_user_installs_is_imported_by_what_every_user_runs():
     """A package that a test alone needs is of the extra test: cvxpy once was not, with
     10 packages and 234 MB."""
-    assert (
-        names(PROJECT["dependencies"]) - set().union(*imported(RUN))
-        == IMPORTED_BY_OTHERS
-    )
+    assert REQUIRED - set().union(*imported(RUN)) == IMPORTED_BY_OTHERS
+
+
+def test_messages_name_the_extra_of_each_package():
+    modules = {"pin": "pinocchio"}
+    packages = {
+        modules.get(name, name): extra
+        for extra in (*RUN_EXTRAS, "audit")
+        for name in names(EXTRAS[extra])
+        # Snakemake brings it.
+        if name != "snakemake-interface-logger-plugins"
+    }
+    assert packages == errors.EXTRAS
 
 
 def test_what_a_run_imports_is_installed_and_the_audit_alone_needs_its_extra():
     # Snakemake's plug-ins use its interfaces, which come with it.
-    given = names(PROJECT["dependencies"]) | {
-        "elastocal",
-        "snakemake-interface-logger-plugins",
-    }
+    given = REQUIRED | {"elastocal"}
     assert [
         packages for packages in imported(set(RUN) - set(AUDIT)) if not packages & given
     ] == []
-    audit = names(PROJECT["optional-dependencies"]["audit"])
+    audit = names(EXTRAS["audit"])
     assert (
         [packages for packages in imported(AUDIT) if not packages & given]
         == [audit]
@@ -91,9 +107,8 @@ def test_the_pins_of_a_run_and_of_the_container_have_nothing_of_tests_and_audit(
             re.MULTILINE,
         )
     )
-    extras = PROJECT["optional-dependencies"]
-    assert pinned >= names(PROJECT["dependencies"])
-    assert pinned & (names(extras["audit"]) | {"cvxpy", "pytest", "yourdfpy"}) == set()
+    assert pinned >= REQUIRED
+    assert pinned & (names(EXTRAS["audit"]) | {"cvxpy", "pytest", "yourdfpy"}) == set()
 
 
 def steps():

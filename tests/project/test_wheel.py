@@ -6,16 +6,22 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import tomllib
 import venv
 import zipfile
+from importlib import metadata
 from pathlib import Path
 
 import pytest
 from made_folders import make_folder
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 import elastocal
+from elastocal.errors import EXTRAS
 
 ROOT = Path(__file__).resolve().parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 SOURCES = (
     "pyproject.toml",
     "README.md",
@@ -87,6 +93,43 @@ def installed(wheel, tmp_path_factory):
         text=True,
     )
     assert done.returncode == 0, done.stderr
+    return folder
+
+
+def find_distributions(names):
+    """Return the distributions of some names and all that they require here."""
+    waiting = [*names]
+    found = {}
+    while waiting:
+        name = canonicalize_name(waiting.pop())
+        if name in found:
+            continue
+        found[name] = metadata.distribution(name)
+        requirements = map(Requirement, found[name].requires or ())
+        waiting += [
+            requirement.name
+            for requirement in requirements
+            if requirement.marker is None or requirement.marker.evaluate({"extra": ""})
+        ]
+    return found
+
+
+@pytest.fixture(scope="module")
+def base(wheel, tmp_path_factory):
+    """An environment with the wheel and its base requirements: links to the packages of
+    these tests, so that nothing is downloaded."""
+    folder = tmp_path_factory.mktemp("base")
+    venv.create(folder, symlinks=True, with_pip=False)
+    packages = Path(sysconfig.get_path("purelib", "venv", {"base": folder}))
+    required = map(Requirement, PROJECT["dependencies"])
+    names = [requirement.name for requirement in required]
+    for distribution in find_distributions(names).values():
+        for entry in {file.parts[0] for file in distribution.files} - {".."}:
+            link = packages / entry
+            if not link.exists():
+                link.symlink_to(distribution.locate_file(entry))
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(packages)
     return folder
 
 
@@ -170,3 +213,39 @@ def test_the_installed_pipeline_reads_a_campaign_in_the_working_directory(
     assert "reports/loop/made/report.html" in done.stdout
     assert "/site-packages/elastocal/report/loop.typ" in done.stdout
     assert f"{ROOT}/src" not in done.stdout
+
+
+@pytest.mark.slow
+def test_base_requirements_suffice_from_arrays_to_corrected_targets(base):
+    """None of the packages of an extra is installed there."""
+    example = [base / "bin" / "python", "workflow/examples/five_lines.py"]
+    done = subprocess.run(
+        example, cwd=ROOT, env=OUTSIDE, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    *_, last = done.stdout.splitlines()
+    assert last == f"not installed: {' '.join(EXTRAS)}"
+    assert "gear transmission error" in done.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("words", "package", "extra"),
+    [(["demo"], "mujoco", "proof"), (["diagnose", "cell"], "snakemake", "pipeline")],
+)
+def test_a_command_names_the_extra_of_a_package_that_is_not_installed(
+    words, package, extra, base, tmp_path, kuka
+):
+    make_folder(tmp_path / "cell", kuka)
+    done = subprocess.run(
+        [base / "bin" / "python", "-m", "elastocal", *words],
+        cwd=tmp_path,
+        env=OUTSIDE,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 1
+    assert done.stderr == (
+        f"Python: found no package {package}; allowed: an environment with it:"
+        f" pip install 'elastocal[{extra}]'\n"
+    )

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from elastocal.command.terminal import (
@@ -15,7 +16,7 @@ from elastocal.command.terminal import (
     find_workplace,
     print_lines,
 )
-from elastocal.errors import InputError
+from elastocal.errors import InputError, describe_system_fault
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -54,6 +55,9 @@ def build_run_command(folder: Path, cores: int, workplace: Path) -> list[str]:
 
     campaign = str(folder.resolve())
     check_workflow_path(campaign)
+    if find_spec("snakemake") is None:
+        missing = ModuleNotFoundError(name="snakemake")
+        raise describe_system_fault(missing)
     snakefile = find_pipeline() / "Snakefile"
     command = [sys.executable, "-m", "snakemake", f"-j{cores}", "diagnose"]
     command += ["--config", f"campaign={campaign}"]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.diagnosis.judge import generate_residual_blocks
+from elastocal.errors import explain_missing_packages
 from elastocal.interface.corrected_robot import CorrectedRobot
 from elastocal.loop.diagnosis_tables import (
     diagnose_with_proposal,
@@ -122,8 +123,10 @@ class DiagnosisResult:
 
     @property
     def plot(self) -> Plots:
-        """Figures of the errors, the residuals and the candidates."""
-        from elastocal.interface.plots import Plots
+        """Figures of the errors, the residuals and the candidates; they need the extra
+        ``report``."""
+        with explain_missing_packages():
+            from elastocal.interface.plots import Plots
 
         return Plots(self)
 
@@ -149,11 +152,12 @@ class DiagnosisResult:
         )
 
     def report(self, path: str | Path) -> None:
-        """Write the report as a PDF."""
-        from elastocal.figures.style import save_all
+        """Write the report as a PDF; needs the extra ``report``."""
         from elastocal.report.typesetting import compile_document
 
-        with TemporaryDirectory() as folder:
+        with explain_missing_packages(), TemporaryDirectory() as folder:
+            from elastocal.figures.style import save_all
+
             figures = save_all(self.plot.all(), folder)
             compile_document(path, "loop.typ", {"facts": self.facts}, figures.values())
 

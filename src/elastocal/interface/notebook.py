@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from importlib.util import find_spec
 from io import BytesIO
 from typing import TYPE_CHECKING
 
@@ -19,20 +20,26 @@ _DOTS_PER_INCH = 110
 def format_result(result: DiagnosisResult) -> str:
     """Format a diagnosis as HTML."""
     first, *others = result.lines
-    picture = BytesIO()
-    result.plot.errors().savefig(picture, format="png", dpi=_DOTS_PER_INCH)
-    encoded = base64.b64encode(picture.getvalue()).decode("ascii")
     rows = "".join(
         f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>"
         for name, value in _list_errors(result).items()
     )
     sentences = "".join(f"<p>{escape(line.strip())}</p>" for line in others)
-    alternative = "Errors of each model at held-out poses"
     return (
         f"<div><p><strong>{escape(first)}</strong></p>{sentences}"
-        f"<table>{rows}</table>"
-        f'<img alt="{alternative}" src="data:image/png;base64,{encoded}"></div>'
+        f"<table>{rows}</table>{_format_figure(result)}</div>"
     )
+
+
+def _format_figure(result: DiagnosisResult) -> str:
+    """Format the errors of each model as a picture; nothing without matplotlib."""
+    if find_spec("matplotlib") is None:
+        return ""
+    picture = BytesIO()
+    result.plot.errors().savefig(picture, format="png", dpi=_DOTS_PER_INCH)
+    encoded = base64.b64encode(picture.getvalue()).decode("ascii")
+    alternative = "Errors of each model at held-out poses"
+    return f'<img alt="{alternative}" src="data:image/png;base64,{encoded}">'
 
 
 def _list_errors(result: DiagnosisResult) -> dict[str, str]:

@@ -11,8 +11,6 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typst
-
 from elastocal.io.atomic_writes import write_atomically
 
 if TYPE_CHECKING:
@@ -125,6 +123,9 @@ def compile_document(
     package : str
         Package that has the document.
     """
+    # Imported only here, because sentences on a terminal need no typesetter.
+    import typst
+
     figures = [*figures]
     contents = {
         **data,
