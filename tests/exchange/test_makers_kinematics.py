@@ -116,7 +116,7 @@ def get_origins(path, is_franka):
         entries = [document[name]["kinematic"] for name in FRANKA_JOINTS]
     else:
         entries = [document["kinematics"][name] for name in UR_LINKS]
-    return [tuple(float(entry[key]) for key in KEYS) for entry in entries]
+    return [tuple(map(float, map(entry.get, KEYS))) for entry in entries]
 
 
 @pytest.mark.parametrize(("name", "is_franka"), [("ur10", False), ("panda", True)])
