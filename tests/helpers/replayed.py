@@ -107,9 +107,12 @@ class Replay:
             rows = [labels[row] for row in np.flatnonzero(chosen)]
             self._write(file, rows, points[chosen], start_s, names)
 
-    def write_path(self, ways_deg, count, notation, names):
+    def write_path(self, ways_deg, count, notation, names, force_N=None):
         """Write path.csv, along straight lines in joint space, as a controller shows
-        it: mm, degrees and its own Euler angles."""
+        it: mm, degrees and its own Euler angles.
+
+        `force_N` is the process force (3,) on the flange along the path, base axes.
+        """
         ways = np.radians(np.array(ways_deg, float))
         share = np.linspace(0, len(ways) - 1, count)
         angles = np.column_stack(
@@ -118,8 +121,13 @@ class Replay:
         position, rotation = self.cell.follow(angles)
         euler = Rotation.from_matrix(rotation).as_euler(notation, degrees=True)
         mark = ";" if self.comma else ","
-        lines = [mark.join(["X", "Y", "Z", *names])]
-        for row in np.column_stack([1e3 * position, euler]):
+        header = ["X", "Y", "Z", *names]
+        table = np.column_stack([1e3 * position, euler])
+        if force_N is not None:
+            header += _FORCE
+            table = np.column_stack([table, np.tile(force_N, (count, 1))])
+        lines = [mark.join(header)]
+        for row in table:
             cells = [f"{value:.4f}" for value in row]
             if self.comma:
                 cells = [cell.replace(".", ",") for cell in cells]
