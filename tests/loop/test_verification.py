@@ -18,6 +18,7 @@ from elastocal.loop.verification import (
     name_next_round,
     read_verification,
 )
+from elastocal.mechanics.components import WRENCH_NAMES
 
 
 def refuse(function, **options):
@@ -32,8 +33,13 @@ def join(tmp_path):
     """Joins measurements at ten targets to a campaign with these changes, whose poses
     from `afternoon` on are a session of their own."""
 
-    def make_and_join(columns=None, afternoon=None, **changes):
+    def make_and_join(columns=None, afternoon=None, *, loaded=True, **changes):
         make_folder(tmp_path / "cell", analysed("kuka"), "cell", **changes)
+        if not loaded:
+            path = tmp_path / "cell" / "measurements.csv"
+            sheet = pd.read_csv(path)
+            sheet[[*WRENCH_NAMES]] = 0.0
+            sheet.to_csv(path, index=False)
         if afternoon is not None:
             path = tmp_path / "cell" / "measurements.csv"
             sheet = pd.read_csv(path)
@@ -70,6 +76,15 @@ def test_a_round_has_both_sessions_with_their_loads(join):
     np.testing.assert_array_equal(further.wrench[:, 2], table["fz"])
     np.testing.assert_array_equal(further.load, [0] * 5 + [1] * 5)
     np.testing.assert_allclose(further.position[:, 2], table["z"] + 1e-3)
+
+
+def test_the_first_measurements_under_load_identify_compliances(join):
+    """Without them a robot whose file states none is taken as rigid."""
+    before, joined, remarks, _ = join(loaded=False, compliance="nominal")
+    assert (before.compliance, joined.compliance) == ("nominal", "identify")
+    assert remarks == [
+        "compliance: identify, because these are the first measurements under load"
+    ]
 
 
 def test_held_out_poses_keep_their_session(join):

@@ -410,7 +410,8 @@ def join_measurements(
     """Write a campaign that has the measurements of a campaign and, as a further session,
     those of its corrected robot.
 
-    In a campaign in the tracker's frame each session has a frame of its own.
+    In a campaign in the tracker's frame each session has a frame of its own. The first
+    measurements under load identify the compliances, as a plan with loads does.
 
     Parameters
     ----------
@@ -421,7 +422,7 @@ def join_measurements(
 
     Returns
     -------
-    Remarks on columns that were left out.
+    Remarks on columns that were left out, and on compliances.
     """
     _, campaign = read_described_campaign(folder)
     if campaign.measured == "pose" and measured.rotation_vector is None:
@@ -444,6 +445,12 @@ def join_measurements(
     }
     document = dict(folder.document) | {"campaign": name}
     document["holdout"] = _number_held_out_poses(folder.holdout, before)
+    is_nominal = document.get("compliance", "nominal") == "nominal"
+    if is_nominal and not before.wrench.any() and further["load"].any():
+        document["compliance"] = "identify"
+        remarks.append(
+            "compliance: identify, because these are the first measurements under load"
+        )
     if not _is_named_robot(folder):
         document["robot"] = _ROBOT
         # The robot file comes first, because a folder with a campaign.yaml needs it.
