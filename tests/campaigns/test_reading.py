@@ -37,6 +37,30 @@ def test_a_campaign_is_read_as_written(cell):
     assert campaign.holdout == {"fraction": 0.4, "seed": 5}
 
 
+@pytest.mark.parametrize(
+    ("stated", "sessions", "expected"),
+    [
+        ({}, 1, (1e-3, 0.0)),
+        ({}, 2, (1e-3, 2e-4)),
+        ({"base_std_m": 0, "application_point_std_m": 0}, 2, (0.0, 0.0)),
+        ({"base_std_m": 1e-4, "application_point_std_m": 5e-3}, 1, (5e-3, 1e-4)),
+    ],
+)
+def test_what_is_declared_is_as_exact_as_stated(cell, stated, sessions, expected):
+    """The registration of a single session defines the base; several differ."""
+    cell.document |= stated
+    if sessions == 2:
+        cell.repeat_as_session_7()
+    campaign = cell.read()
+    assert (campaign.application_point_std_m, campaign.base_std_m) == expected
+
+
+def test_a_base_that_is_fitted_has_no_declared_standard_deviation(cell):
+    cell.document |= {"frame": "tracker", "base_std_m": 1e-4}
+    with refused(cell.source, "base_std_m", "frame: tracker", "frame: base"):
+        cell.read()
+
+
 def test_measurements_are_read_as_written(cell):
     campaign = cell.read()
     measurements = campaign.measurements

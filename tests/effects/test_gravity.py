@@ -19,9 +19,13 @@ from synthetic import (
     slopes,
 )
 
-from elastocal.effects.catalogue import candidates_on
+from elastocal.effects.catalogue import candidates_on, moves_robot
 from elastocal.effects.conditions import build_conditions, find_offered_needs
-from elastocal.effects.gravity import declared_weight, find_lever_of_pull
+from elastocal.effects.gravity import (
+    declared_application_point,
+    declared_weight,
+    find_lever_of_pull,
+)
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import (
     compute_displaced_coordinates,
@@ -287,3 +291,15 @@ def test_without_masses_and_loads_the_structure_bears_the_usual_weight(
         slope = (energy(commanded + step) - energy(commanded - step)) / 2e-4
         np.testing.assert_allclose(around.total[:, coordinate], -slope, atol=1e-3)
     assert not around.total[:, :6].any()
+
+
+def test_a_declared_application_point_acts_as_the_effect_of_the_catalogue(fanuc):
+    """Its error belongs to the measurements, and tasks do not feel it."""
+    conditions = conditions_on(fanuc, make_states(6, 5))
+    declared = declared_application_point(conditions.sites, 1e-3)
+    found = find_candidate(fanuc, "application_point[flange axes]")
+    np.testing.assert_array_equal(
+        displacements(declared, conditions), displacements(found, conditions)
+    )
+    assert [parameter.prior_std for parameter in declared.parameters] == [1e-3] * 3
+    assert not moves_robot(declared)

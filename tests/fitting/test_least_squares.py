@@ -674,6 +674,27 @@ def test_a_declared_offset_is_estimated_with_its_prior(kuka, offset_std_m):
     )
 
 
+@pytest.mark.parametrize("base_std_m", [1e-5, 2e-4])
+def test_sessions_with_a_declared_base_are_placed_within_their_prior(kuka, base_std_m):
+    """A frame moves by the share that its prior and its measurements give it, and the
+    offset of joint 3 is no longer biased by a session that was registered elsewhere."""
+    target = Target("A", "6DoF", (0.1, 0.0, 0.05))
+    exact = build_model(kuka, "joint_offset@3", targets=(target,), fitted_frames=False)
+    states = make_states(kuka.joints, 40, sessions=2)
+    true = make_estimate(exact, sessions=(0, 1), size=0.0)
+    shift = np.array([[1e-4, 0.0, 0.0], [0.0, -1e-4, 2e-4]])
+    observations = observe_exactly(exact, replace(true, frame_position=shift), states)
+    noise = Noise("declared", 2e-6, 2e-6, np.zeros(6))
+    fitted = fit_model(replace(exact, base_std_m=base_std_m), observations, noise)
+    free = fit_model(replace(exact, base_std_m=1.0), observations, noise)
+    np.testing.assert_allclose(free.estimate.frame_position, shift, atol=3e-6)
+    np.testing.assert_allclose(fitted.estimate.frame_position, shift, atol=1e-5)
+    assert (np.diag(fitted.covariance)[:12] < base_std_m**2).all()
+    biased = fit_model(exact, observations, noise)
+    assert abs(biased.estimate.coefficients[0][0]) > 2e-5
+    assert abs(fitted.estimate.coefficients[0][0]) < 5e-6
+
+
 def test_springs_stay_at_zero_where_loads_of_the_wrong_sign_would_make_them_negative(
     fanuc,
 ):

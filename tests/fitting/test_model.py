@@ -130,11 +130,14 @@ def test_before_is_the_error_of_the_rigid_robot_if_the_file_has_masses_and_no_sp
 
 
 @pytest.mark.parametrize(
-    ("compliance", "compliance_effects"),
-    [("identify", {"joint_compliance"}), ("nominal", set())],
+    ("compliance", "load_effects"),
+    [
+        ("identify", {"joint_compliance", "declared_application_point"}),
+        ("nominal", {"declared_application_point"}),
+    ],
 )
 def test_the_model_has_the_declared_effects_and_the_candidates_are_all_others(
-    campaign, config_folder, compliance, compliance_effects
+    campaign, config_folder, compliance, load_effects
 ):
     case = build_case_of(
         campaign,
@@ -144,7 +147,7 @@ def test_the_model_has_the_declared_effects_and_the_candidates_are_all_others(
     )
     declared = case.model.effects
     assert {effect.effect for effect in declared} == {
-        *compliance_effects,
+        *load_effects,
         "hysteresis",
         "joint_offset",
     }
@@ -157,7 +160,7 @@ def test_the_model_has_the_declared_effects_and_the_candidates_are_all_others(
     undeclared = build_case_of(campaign, config_folder)
     additional = set(undeclared.candidates) - set(case.candidates)
     assert additional >= {
-        effect.key for effect in declared if effect.effect not in compliance_effects
+        effect.key for effect in declared if effect.effect not in load_effects
     }
     assert {key.split("@")[0] for key in additional} == {"joint_offset", "hysteresis"}
 
@@ -390,3 +393,75 @@ def test_a_declared_offset_is_a_parameter_about_its_declared_value(kuka, campaig
     )
     assert model.has_unknown_targets
     assert build_nominal_model(model).targets[1].offset_std_m == 0.0
+
+
+def test_a_declared_base_is_a_parameter_of_each_session_about_its_declared_value(
+    kuka, campaign
+):
+    """Its steps, values and priors count from what is declared; an exact one is none."""
+    exact = replace(build_declared_model(campaign), fitted_frames=False)
+    model = build_declared_model(replace(campaign, frame="base", base_std_m=2e-4))
+    assert "declared_base" in [effect.effect for effect in model.effects]
+    estimate = make_estimate(model, sessions=(0, 3))
+    parameters = list_parameters(model, estimate)
+    frames = [
+        (owner, parameter.prior_std)
+        for owner, parameter in parameters
+        if owner.startswith("frame ")
+    ]
+    assert frames == [("frame 0", 2e-4)] * 6 + [("frame 3", 2e-4)] * 6
+    step = np.zeros(len(parameters))
+    step[6:12] = 1e-4, -2e-4, 3e-4, 2e-4, 1e-4, -1e-4
+    moved = apply_step(model, estimate, step)
+    np.testing.assert_allclose(
+        get_parameter_values(model, moved)[:12], step[:12], atol=1e-15
+    )
+    np.testing.assert_allclose(moved.frame_position[1], step[6:9])
+    for without in (exact, build_nominal_model(model)):
+        owners = [owner for owner, _ in list_parameters(without, estimate)]
+        assert not any(owner.startswith("frame ") for owner in owners)
+
+
+@pytest.mark.parametrize(
+    ("std_m", "compliance", "force", "expected"),
+    [
+        (1e-3, "identify", 500.0, [1e-3] * 3),
+        (0.0, "identify", 500.0, []),
+        (1e-3, "identify", 0.0, []),
+        (1e-3, "nominal", 500.0, []),
+    ],
+)
+def test_loads_on_springs_act_at_a_point_that_is_known_as_well_as_declared(
+    kuka, std_m, compliance, force, expected
+):
+    """The robot is rigid if its compliances are nominal."""
+    rigid = replace(kuka, compliance=np.zeros(6))
+    measurements = make_measurements(
+        make_model(kuka.chain, (Target("A", "6DoF", (0, 0, 0)),)),
+        np.random.default_rng(0),
+        2,
+        1,
+        0.0,
+        0.0,
+    )
+    wrench = np.full_like(measurements.wrench, force)
+    campaign = Campaign(
+        "c",
+        rigid,
+        "position",
+        "base",
+        TWO_TARGETS,
+        compliance,
+        (),
+        None,
+        {},
+        replace(measurements, wrench=wrench),
+        application_point_std_m=std_m,
+    )
+    deviations = [
+        parameter.prior_std
+        for effect in build_declared_model(campaign).effects
+        if effect.effect == "declared_application_point"
+        for parameter in effect.parameters
+    ]
+    assert deviations == expected

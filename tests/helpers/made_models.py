@@ -15,7 +15,8 @@ from elastocal.application.scope import calibrate_by_campaign_fit
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.elastic import joint_compliance
-from elastocal.effects.gravity import declared_weight
+from elastocal.effects.geometry import declared_base
+from elastocal.effects.gravity import declared_application_point, declared_weight
 from elastocal.fitting.model import Model, list_parameters
 from elastocal.fitting.noise import Noise
 from elastocal.mechanics.robot import Compensator
@@ -24,6 +25,8 @@ from elastocal.residual_model.selection import fit_to_observations, is_commanded
 from elastocal.verdict import CrossValidatedGain, RegressionChoice, Spread
 
 ROBOTS = ("kuka", "fanuc", "ur10", "iiwa14", "gen3")
+# The robot whose base is declared; the others have fitted frames.
+DECLARED_BASE = "gen3"
 # A regression of each kind on the residuals, and its setting.
 SETTINGS = {
     "ridge_harmonics": {"orders": 2, "penalty": 1e-3},
@@ -57,7 +60,8 @@ def choose_effects(sites):
     for candidate in candidates_on(sites).values():
         if is_commanded(candidate):
             chosen.setdefault(candidate.effect, []).append(candidate)
-    effects = [joint_compliance(sites)]
+    point_error = declared_application_point(sites, 2e-3)
+    effects = [joint_compliance(sites), point_error, declared_base(sites)]
     if sites.masses:
         effects.append(declared_weight(sites))
     for candidates in chosen.values():
@@ -81,10 +85,11 @@ def make_calibrated(name, regression="", seed=3):
     model = Model(
         sites,
         (Target("A", sites.chain.end_effector.name, None),),
-        fitted_frames=True,
+        fitted_frames=name != DECLARED_BASE,
         rows=3,
         nominal_compliance=robot.compliance,
         effects=choose_effects(sites),
+        base_std_m=2e-4 * (name == DECLARED_BASE),
     )
     estimate = make_estimate(model, seed=seed, size=0.2)
     states = make_states(robot.joints, STATES, seed, force=100.0, span=1.5)

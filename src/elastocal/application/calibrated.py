@@ -193,7 +193,9 @@ def move_to_end_effector(model: Model, estimate: Estimate) -> tuple[Model, Estim
         target_offset=np.array([end.offset_m]),
         target_rotation=np.eye(3)[None],
     )
-    end_model = replace(model, targets=(target,), fitted_frames=False, rows=6)
+    end_model = replace(
+        model, targets=(target,), fitted_frames=False, rows=6, base_std_m=0.0
+    )
     return end_model, end_estimate
 
 

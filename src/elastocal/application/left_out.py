@@ -32,6 +32,7 @@ from elastocal.residual_model.selection import is_commanded
 
 if TYPE_CHECKING:
     from elastocal.application.frames import Scope
+    from elastocal.effects.protocol import Candidate
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.observations import States
 
@@ -91,9 +92,7 @@ class LeftOutEffects:
         """
         model = self.model
         left_out = {
-            number
-            for number, effect in enumerate(model.effects)
-            if not is_commanded(effect)
+            number for number, effect in enumerate(model.effects) if is_left_out(effect)
         }
         chain = model.sites.chain
         end_poses = []
@@ -172,7 +171,13 @@ class LeftOutEffects:
         return replace(self.states.select(chosen), approach=sides)
 
 
+def is_left_out(effect: Candidate) -> bool:
+    """Whether tasks may feel an effect that no command contains; an error of what a
+    campaign declares of its own measurements ends with them."""
+    return not is_commanded(effect) and effect.family != "declared"
+
+
 def _find_parameters(model: Model, estimate: Estimate) -> np.ndarray:
     """Find the parameters of the effects that no command contains, (P,) bool."""
-    keys = {effect.key for effect in model.effects if not is_commanded(effect)}
+    keys = {effect.key for effect in model.effects if is_left_out(effect)}
     return np.array([owner in keys for owner, _ in list_parameters(model, estimate)])

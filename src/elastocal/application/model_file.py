@@ -19,12 +19,13 @@ import numpy as np
 from elastocal import __version__
 from elastocal.application.calibrated import CampaignFit, ResidualModel
 from elastocal.application.scope import calibrate_by_campaign_fit, set_form_error
-from elastocal.campaigns.campaign import Target
+from elastocal.campaigns.campaign import APPLICATION_POINT_STD_M, Target
 from elastocal.effects.catalogue import candidates_on, list_effects
 from elastocal.effects.conditions import MASS_PARAMETERS
 from elastocal.effects.elastic import joint_compliance
 from elastocal.effects.formulas import Term, derive_formulas, sum_formulas
-from elastocal.effects.gravity import declared_weight
+from elastocal.effects.geometry import declared_base
+from elastocal.effects.gravity import declared_application_point, declared_weight
 from elastocal.errors import InputError
 from elastocal.fitting.model import (
     LOAD_EFFECTS,
@@ -293,6 +294,8 @@ class FitRecord:
         As the campaign declares them.
     fitted_frames : bool
         Whether the placement of the base was fitted.
+    base_std_m : float
+        As in `Model`.
     rows : int
         3 if positions were measured, 6 if poses were.
     nominal_compliance : tuple of float
@@ -318,6 +321,7 @@ class FitRecord:
 
     targets: tuple[Target, ...]
     fitted_frames: bool
+    base_std_m: float
     rows: int
     nominal_compliance: tuple[float, ...]
     compliance_known: bool
@@ -594,6 +598,7 @@ def _describe_fit(calibrated: CalibratedRobot, sites: Sites) -> FitRecord:
     return FitRecord(
         model.targets,
         model.fitted_frames,
+        model.base_std_m,
         model.rows,
         _as_numbers(model.nominal_compliance),
         model.compliance_known,
@@ -648,11 +653,14 @@ def _restore_declared_model(robot: Robot, record: FitRecord) -> Model:
         record.time_zero_s,
         record.row_span,
         record.compliance_known,
+        record.base_std_m,
     )
 
 
 def _list_known_effects(sites: Sites) -> dict[str, Candidate]:
-    declared = [joint_compliance(sites)]
+    # The record has the priors with which the campaign was fitted.
+    point_error = declared_application_point(sites, APPLICATION_POINT_STD_M)
+    declared = [joint_compliance(sites), point_error, declared_base(sites)]
     if sites.masses:
         declared.append(declared_weight(sites))
     return {effect.key: effect for effect in declared} | candidates_on(sites)

@@ -24,10 +24,9 @@ from elastocal.application.frames import (
     fit_placement,
     select_free_parameters,
 )
-from elastocal.application.left_out import LeftOutEffects
+from elastocal.application.left_out import LeftOutEffects, is_left_out
 from elastocal.fitting.noise import estimate_joint_repeatability
 from elastocal.mechanics.kinematics import compute_pose_differences
-from elastocal.residual_model.selection import is_commanded
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -235,7 +234,7 @@ def _add_left_out_effects(
     states: States,
 ) -> Scope:
     """Add the effects that are in no command to a scope."""
-    left_out = tuple(effect.key for effect in model.effects if not is_commanded(effect))
+    left_out = tuple(effect.key for effect in model.effects if is_left_out(effect))
     if not left_out:
         return scope
     effects = LeftOutEffects.from_fit(model, estimate, covariance, states)

@@ -25,6 +25,12 @@ NO_ROTATION = (0.0, 0.0, 0.0)
 # Standard deviation of each coordinate of a declared offset that states none, m: a
 # caliper on a bracket, or a drawing of the tool.
 OFFSET_STD_M = 2e-4
+# Standard deviation of each coordinate of a declared base in each of several sessions, if
+# a campaign states none, m: trackers are registered to 0.05 to 0.3 mm.
+BASE_STD_M = 2e-4
+# Standard deviation of each coordinate of the point at which a load acts, if a campaign
+# states none, m: a hook or a weight is located with a rule and has play where it hangs.
+APPLICATION_POINT_STD_M = 1e-3
 
 
 @dataclass(frozen=True)
@@ -139,6 +145,10 @@ class Campaign:
     noise : declared noise, if any.
     holdout : rule that selects the held-out poses.
     measurements : the measurements.
+    application_point_std_m : standard deviation of each coordinate of the point at which
+        the load acts, in flange axes; 0 if the point is exact by definition.
+    base_std_m : standard deviation of each coordinate of a declared base in each session;
+        0 if the base is exact by definition, or unknown.
     remainder : residual model, a name in `residual_model.regressions`, "auto" or "none".
     table : name of the file of measurements; empty if there is none.
     header_line : line of the header if the file is text.
@@ -155,6 +165,8 @@ class Campaign:
     holdout: dict[str, Any]
     measurements: Measurements
     remainder: str = NO_REMAINDER
+    application_point_std_m: float = 0.0
+    base_std_m: float = 0.0
     table: str = ""
     header_line: int | None = None
 
@@ -195,9 +207,26 @@ def assemble_campaign(
         holdout=document.get("holdout", DEFAULT_HOLDOUT),
         measurements=measurements,
         remainder=document.get("remainder", BEST_REMAINDER),
+        application_point_std_m=float(
+            document.get("application_point_std_m", APPLICATION_POINT_STD_M)
+        ),
+        base_std_m=_parse_base_std_m(document, measurements),
         table=document.get("table", ""),
         header_line=document.get("header_line"),
     )
+
+
+def _parse_base_std_m(document: Mapping[str, Any], measurements: Measurements) -> float:
+    """Return the standard deviation of a declared base, m.
+
+    The registration of a single session defines the frame in which the robot is
+    corrected, so that it is exact unless stated otherwise. Several registrations differ.
+    """
+    if document["frame"] != "base":
+        return 0.0
+    session = measurements.session
+    default = BASE_STD_M if (session != session[:1]).any() else 0.0
+    return float(document.get("base_std_m", default))
 
 
 def parse_targets(

@@ -108,6 +108,9 @@ def build_campaign(
     _check_measurements(measurements, table, robot, targets)
     _check_targets_measured(measurements, table, targets, source)
     _check_compliance(document, robot, measurements, source)
+    if "base_std_m" in document and document["frame"] != "base":
+        allowed = "frame: base; an unknown placement of the base has no prior"
+        raise InputError(source, "base_std_m", f"frame: {document['frame']}", allowed)
     _check_noise(document.get("noise"), measurements, robot, source)
     holdout = document.get("holdout", DEFAULT_HOLDOUT)
     select_held_out(holdout, measurements, robot.reported_offset, source)

@@ -12,6 +12,7 @@ from elastocal.effects.protocol import (
     WAVES,
     Parameter,
     Shape,
+    declare_with_prior,
     effect,
     every_joint,
     moved_and_turned,
@@ -21,7 +22,7 @@ from elastocal.effects.sizes import REACH, Size
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
-    from elastocal.effects.protocol import Candidates, Displacements, Effect
+    from elastocal.effects.protocol import Candidate, Candidates, Displacements, Effect
     from elastocal.mechanics.sites import Sites
 
 _effect = partial(effect, "geometry")
@@ -123,6 +124,18 @@ def base_placement(entry: Effect, sites: Sites) -> Candidates:
         lambda conditions: [{c: conditions.ones} for c in sites.base],
         {"declared base"},
     )
+
+
+def declared_base(sites: Sites) -> Candidate:
+    """Make one candidate of the robot's place on a base whose registrations are not exact.
+
+    It is the catalogue's `base_placement` with its size as the prior, so that the mean of
+    the registrations and the robot's place share what all sessions have in common. Tasks
+    refer to the declared base, so that the robot's place moves it in them.
+    """
+    (candidate,) = base_placement.candidates(sites)
+    sizes = [parameter.plausible for parameter in candidate.parameters]
+    return declare_with_prior(candidate, "declared_base", sizes)
 
 
 # The reflector circles in its nest; the flange does not.

@@ -17,6 +17,7 @@ from elastocal.effects.protocol import (
     LOADED_JOINTS,
     Candidate,
     Parameter,
+    declare_with_prior,
     effect,
     small_form,
     turning_joints,
@@ -59,7 +60,8 @@ _UNEXPLAINED_MOMENTS = 0.01
 # forces and moments, so that the moments are right. A sensor in the line of a pull measures
 # the force alone, so that the moments have the error of the force at its lever.
 _PULL = " in the pull"
-_FRAMES = [("base axes",), ("flange axes",)]
+_FLANGE = "flange axes"
+_FRAMES = [("base axes",), (_FLANGE,)]
 _AND_IN_PULL = [*_FRAMES, *((frame + _PULL,) for (frame,) in _FRAMES)]
 
 
@@ -102,6 +104,28 @@ def declared_weight(sites: Sites) -> Candidate:
             for axis in "xyz"
         ]
     return Candidate(DECLARED_WEIGHT, "declared", (), "", tuple(parameters), law)
+
+
+def declared_application_point(sites: Sites, std_m: float) -> Candidate:
+    """Make one candidate of the error of the declared point at which the load acts.
+
+    It is the catalogue's `application_point` in flange axes, where hooks and weights are
+    fixed, with the prior of a campaign. The declared model contains it if the campaign
+    has loads. It belongs to the measurements, so that tasks do not feel it.
+
+    Parameters
+    ----------
+    sites : sites of the robot.
+    std_m : standard deviation of each coordinate of the point, m.
+    """
+    on_flange = next(
+        candidate
+        for candidate in application_point.candidates(sites)
+        if candidate.detail == _FLANGE
+    )
+    return declare_with_prior(
+        on_flange, "declared_application_point", [std_m] * 3, of_setup=True
+    )
 
 
 def _list_by_joint(torques: np.ndarray, compliance: np.ndarray) -> Displacements:

@@ -234,6 +234,34 @@ def moved_and_turned(shift: float, turn: float, per: str = "") -> tuple[Paramete
     )
 
 
+def declare_with_prior(
+    candidate: Candidate, effect: str, std: Sequence[float], **options: Any
+) -> Candidate:
+    """Make the candidate of an error within the uncertainty of what is declared.
+
+    It acts as a candidate of the catalogue and is part of the declared model.
+
+    Parameters
+    ----------
+    candidate : candidate of the catalogue.
+    effect : name of the effect within the declared model.
+    std : standard deviation of the normal prior of each parameter.
+    options : further fields of the candidate.
+    """
+    parameters = tuple(
+        replace(parameter, plausible=deviation, prior_std=deviation)
+        for parameter, deviation in zip(candidate.parameters, std, strict=True)
+    )
+    return replace(
+        candidate,
+        effect=effect,
+        family="declared",
+        detail="",
+        parameters=parameters,
+        **options,
+    )
+
+
 def require_unique(names: Sequence[str]) -> None:
     """Refuse two candidates of one name: tables could not distinguish them.
 

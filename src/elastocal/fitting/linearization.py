@@ -294,7 +294,7 @@ def linearize(
     jacobian = by_coordinates.columns.jacobian
     states = observations.states
     basis: list[Mapping[int, np.ndarray]] = []
-    if model.fitted_frames:
+    if model.has_frame_parameters:
         for session in estimate.sessions:
             in_session = (states.session == session).astype(float)
             basis += [{coordinate: in_session} for coordinate in model.sites.base]

@@ -20,7 +20,12 @@ from elastocal.effects.conditions import (
     replace_springs,
 )
 from elastocal.effects.elastic import joint_compliance
-from elastocal.effects.gravity import DECLARED_WEIGHT, declared_weight
+from elastocal.effects.geometry import declared_base
+from elastocal.effects.gravity import (
+    DECLARED_WEIGHT,
+    declared_application_point,
+    declared_weight,
+)
 from elastocal.effects.protocol import Candidate, Parameter, moved_and_turned
 from elastocal.fitting.observations import (
     Observations,
@@ -47,6 +52,9 @@ if TYPE_CHECKING:
 # Plausible sizes of frames and targets, which may be anywhere in a workshop.
 _PLACEMENT_M = 1.0
 _PLACEMENT_RAD = 1.0
+# Distance between the points by which a tracker is registered to a base: an error of
+# them turns the base by itself over this length.
+_REGISTRATION_SPAN_M = 1.0
 # Fixed-point iterations of the load at the displaced pose. Each reduces the error by
 # the ratio of deflection to reach, some 1 / 500 at 3 kN; the first error, that of the
 # commanded pose, is ten micrometres.
@@ -82,6 +90,9 @@ class Model:
     compliance_known : bool
         Whether the nominal compliances are those of the robot file; otherwise they are
         usual ones, or 0 for joints that are taken as rigid.
+    base_std_m : float
+        Standard deviation of each coordinate of a declared base in each session, which
+        is fitted with this prior; 0 if the base is exact or unknown.
     """
 
     sites: Sites
@@ -93,6 +104,12 @@ class Model:
     time_zero_s: float = 0.0
     row_span: tuple[int, int] | None = None
     compliance_known: bool = True
+    base_std_m: float = 0.0
+
+    @property
+    def has_frame_parameters(self) -> bool:
+        """Whether the placements of the base are parameters, with or without priors."""
+        return self.fitted_frames or self.base_std_m > 0.0
 
     @property
     def identifies_compliance(self) -> bool:
@@ -190,11 +207,18 @@ def build_declared_model(
     # joint is indistinguishable from the sag of that arm.
     unknown_load = not sites.masses and not measurements.wrench.any()
     sites = replace(sites, bears_typical_weight=sites.prismatic[0] and unknown_load)
-    load_effects = []
+    own_effects = []
     if campaign.compliance == "identify":
-        load_effects.append(joint_compliance(sites))
+        own_effects.append(joint_compliance(sites))
     if sites.masses:
-        load_effects.append(declared_weight(sites))
+        own_effects.append(declared_weight(sites))
+    yields = campaign.compliance == "identify" or campaign.robot.compliance.any()
+    if campaign.application_point_std_m and yields and measurements.wrench.any():
+        own_effects.append(
+            declared_application_point(sites, campaign.application_point_std_m)
+        )
+    if campaign.base_std_m:
+        own_effects.append(declared_base(sites))
     row_span = None
     if len(measurements):
         row_span = (int(measurements.row.min()), int(measurements.row.max()))
@@ -205,10 +229,11 @@ def build_declared_model(
         campaign.frame == "tracker",
         6 if campaign.measured == "pose" else 3,
         campaign.robot.compliance,
-        (*load_effects, *effects),
+        (*own_effects, *effects),
         0.0 if time_s is None else float(time_s.min()),
         row_span,
         campaign.robot.compliance_known,
+        campaign.base_std_m,
     )
 
 
@@ -217,15 +242,21 @@ def build_nominal_model(model: Model) -> Model:
 
     It has the geometry of the robot file, and its springs only if the file states them:
     joints of unknown compliance are rigid, because typical compliances are a scale for
-    identification and would bend under declared masses. Only frames and unknown targets
-    are fitted; declared offsets stay as declared. Every error that is called "before" is
+    identification and would bend under declared masses. Only unknown frames and targets
+    are fitted; declared ones stay as declared. Every error that is called "before" is
     the error of this model.
     """
     compliance = model.nominal_compliance
     if not model.compliance_known:
         compliance = np.zeros_like(compliance)
     targets = tuple(replace(target, offset_std_m=0.0) for target in model.targets)
-    return replace(model, targets=targets, effects=(), nominal_compliance=compliance)
+    return replace(
+        model,
+        targets=targets,
+        effects=(),
+        nominal_compliance=compliance,
+        base_std_m=0.0,
+    )
 
 
 def list_parameters(model: Model, estimate: Estimate) -> list[tuple[str, Parameter]]:
@@ -238,10 +269,11 @@ def list_parameters(model: Model, estimate: Estimate) -> list[tuple[str, Paramet
     """
     parameters = []
     components = moved_and_turned(_PLACEMENT_M, _PLACEMENT_RAD)
-    if model.fitted_frames:
+    if model.has_frame_parameters:
+        frame_components = _describe_frame(model)
         for session in estimate.sessions:
             owner = f"frame {session}"
-            parameters += [(owner, component) for component in components]
+            parameters += [(owner, component) for component in frame_components]
     for index, fitted in model.fitted_target_components:
         target = model.targets[index]
         owner = f"target {target.name}"
@@ -259,6 +291,17 @@ def list_parameters(model: Model, estimate: Estimate) -> list[tuple[str, Paramet
             width = shape.highest - shape.lowest
             parameters.append((effect.key, Parameter(shape.name, shape.unit, width)))
     return parameters
+
+
+def _describe_frame(model: Model) -> tuple[Parameter, ...]:
+    """Describe the components of a frame; those of a declared base have priors."""
+    if model.fitted_frames:
+        return moved_and_turned(_PLACEMENT_M, _PLACEMENT_RAD)
+    std_m = model.base_std_m
+    return tuple(
+        replace(component, prior_std=component.plausible)
+        for component in moved_and_turned(std_m, std_m / _REGISTRATION_SPAN_M)
+    )
 
 
 def find_placement_parameters(owners: Iterable[str]) -> np.ndarray:
@@ -295,12 +338,15 @@ def find_nonlinear_parameters(model: Model, estimate: Estimate) -> np.ndarray:
 def get_parameter_values(model: Model, estimate: Estimate) -> np.ndarray:
     """Present values of the parameters, (P,) array.
 
-    Frames and unknown targets are fitted by steps and count as zero. Declared offsets
-    that are not exact count from their declared values, as their priors do.
+    Frames and unknown targets are fitted by steps and count as zero. Declared bases and
+    offsets that are not exact count from their declared values, as their priors do.
     """
     values = []
     if model.fitted_frames:
         values.append(np.zeros(6 * len(estimate.sessions)))
+    elif model.base_std_m:
+        turn = Rotation.from_matrix(estimate.frame_rotation).as_rotvec()
+        values.append(np.hstack([estimate.frame_position, turn]).ravel())
     for index, fitted in model.fitted_target_components:
         target = model.targets[index]
         deviation = np.zeros(6)
@@ -336,7 +382,7 @@ def _move_placement(
     """Move the frames and targets of an estimate by the next components of a step."""
     frame_rotation = estimate.frame_rotation.copy()
     frame_position = estimate.frame_position.copy()
-    if model.fitted_frames:
+    if model.has_frame_parameters:
         for number in range(len(estimate.sessions)):
             shift, turn = np.split(next(components), 2)
             frame_position[number] += frame_rotation[number] @ shift
@@ -363,7 +409,7 @@ def _move_placement(
 def _group_sizes(model: Model, estimate: Estimate) -> list[int]:
     """Numbers of parameters of each frame and target, and of the coefficients and the
     shapes of each effect."""
-    sizes = [6] * len(estimate.sessions) if model.fitted_frames else []
+    sizes = [6] * len(estimate.sessions) if model.has_frame_parameters else []
     for _, fitted in model.fitted_target_components:
         sizes.append(fitted.stop - fitted.start)
     for effect in model.effects:

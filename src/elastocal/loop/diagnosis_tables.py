@@ -311,7 +311,7 @@ def _stack_values(model: Model, estimate: Estimate) -> np.ndarray:
     """Return the values of all parameters (P,), in the order of `list_parameters`;
     placements are absolute."""
     values = [np.zeros(0)]
-    if model.fitted_frames:
+    if model.has_frame_parameters:
         for position, rotation in zip(
             estimate.frame_position, estimate.frame_rotation, strict=True
         ):

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 # Entries of the error budget that have other words than an effect of the catalogue.
 _SHARES = {
     "joint_compliance": "joint compliance under loads and weights",
+    "declared_base": "place of the robot on the declared base",
+    "declared_application_point": "error of the declared point of the load",
     "declared_weight": "errors of the declared weights",
     "joint_offset": "joint offsets",
     "link_geometry": "link geometry",

@@ -31,9 +31,10 @@ from elastocal.application.calibrated import (
 )
 from elastocal.application.frames import BASE, ROBOT, Scope, subtract_placement
 from elastocal.application.scope import is_offset_fitted
+from elastocal.campaigns.campaign import APPLICATION_POINT_STD_M
 from elastocal.effects.catalogue import declared_candidates
 from elastocal.effects.elastic import joint_compliance
-from elastocal.effects.gravity import declared_weight
+from elastocal.effects.gravity import declared_application_point, declared_weight
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import (
     Estimate,
@@ -170,7 +171,8 @@ def declare_model(survey: Survey) -> tuple[Model, Estimate]:
     if sites.masses:
         effects = (declared_weight(sites), *effects)
     if survey.loaded:
-        effects = (joint_compliance(sites), *effects)
+        point_error = declared_application_point(sites, APPLICATION_POINT_STD_M)
+        effects = (joint_compliance(sites), point_error, *effects)
     model = Model(
         sites,
         survey.targets,
