@@ -65,6 +65,8 @@ class TracedEvidence:
         self._document = document
         self._scales = np.array(self.settings["scales"])
         self._pose_errors = np.array(document["pose_error_rad"])
+        self._span: tuple[int, ...] | None = None
+        self._rotated: list[_Measurements] = []
         weights = self._weigh_pose_errors()
         self._measurements = [
             _integrate_declared(document, *size_and_weight)
@@ -101,14 +103,27 @@ class TracedEvidence:
         densities = [
             measurements.log_weight
             + _compute_log_normal(
-                measurements.columns[:, columns] * deviations,
-                measurements.residual,
-                signs,
-                count,
+                measurements.columns * deviations, measurements.residual, signs, count
             )
-            for measurements in self._measurements
+            for measurements in self._rotate_into(tuple(columns))
         ]
         return float(logsumexp(densities))
+
+    def _rotate_into(self, columns: tuple[int, ...]) -> list[_Measurements]:
+        """Rotate the measurements into the span of some columns and the residual, beyond
+        which the covariance is one at any scales; the last span is kept."""
+        if self._span != columns:
+            self._span = columns
+            self._rotated = []
+            for measurements in self._measurements:
+                values = [measurements.columns[:, columns], measurements.residual]
+                triangle = np.array(np.linalg.qr(np.column_stack(values), mode="r"))
+                self._rotated.append(
+                    _Measurements(
+                        measurements.log_weight, triangle[:, :-1], triangle[:, -1]
+                    )
+                )
+        return self._rotated
 
     def compute_log_evidence(self, model: Mapping[str, Any]) -> float:
         """Compute the log evidence of a model: the product of the sums over the scales
@@ -263,13 +278,10 @@ def _compute_log_normal(
     signs : (k,), sign that physics gives a coefficient, 0 if it may have either
     count : degrees of freedom, from which the noise is estimated if it exceeds one
     """
-    # Beyond the span of these columns the covariance is one in any model.
-    rotated = np.array(np.linalg.qr(np.column_stack([spread, residual]), mode="r"))
-    spread = rotated[:, :-1]
     covariance = stats.Covariance.from_cholesky(
-        np.linalg.cholesky(np.eye(len(rotated)) + spread @ spread.T)
+        np.linalg.cholesky(np.eye(len(spread)) + spread @ spread.T)
     )
-    white = covariance.whiten(rotated[:, -1])
+    white = covariance.whiten(residual)
     squares = float(white @ white)
     variance = max(squares / count, 1.0)
     density = -0.5 * (covariance.log_pdet + count * np.log(variance))
