@@ -8,7 +8,8 @@ and how many identified compliances are within their intervals of 95 %. `python
 benchmarks/declared_setups.py sessions COUNT SEED --off-mm 0.2` draws robots with errors
 in their geometry that are measured in four sessions, each after a new registration of
 the tracker; it prints how many get an effect, and compares the true tool of the
-corrected robot with the bounds; the base itself is no false effect. Rates have Clopper-Pearson intervals of 95 %.
+corrected robot with the bounds; the base itself is no false effect. Rates have
+Clopper-Pearson intervals of 95 %.
 """
 
 from __future__ import annotations
