@@ -19,7 +19,9 @@ NAMES = [
     "Plots",
     "Robot",
     "Verdict",
+    "Verification",
     "__version__",
+    "certify",
     "check",
     "compare",
     "diagnose",
@@ -29,6 +31,7 @@ NAMES = [
     "read_robot",
     "read_verdict",
     "simulate",
+    "verify",
 ]
 
 

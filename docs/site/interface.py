@@ -44,7 +44,13 @@ INTERFACE = {
         "elastocal.interface.plots": ("Plots",),
     },
     "Correct a robot": {
-        "elastocal.interface.corrected_robot": ("CorrectedRobot", "read_model"),
+        "elastocal.interface.corrected_robot": (
+            "CorrectedRobot",
+            "read_model",
+            "certify",
+            "verify",
+        ),
+        "elastocal.loop.verification": ("Verification",),
         "elastocal.application.path_correction": ("CorrectedPath",),
     },
     "Compare diagnoses": {

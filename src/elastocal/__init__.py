@@ -15,12 +15,18 @@ if TYPE_CHECKING:
     from elastocal.errors import InputError
     from elastocal.interface.campaigns import Campaign, read_campaign
     from elastocal.interface.comparison import Comparison, compare
-    from elastocal.interface.corrected_robot import CorrectedRobot, read_model
+    from elastocal.interface.corrected_robot import (
+        CorrectedRobot,
+        certify,
+        read_model,
+        verify,
+    )
     from elastocal.interface.diagnoses import DiagnosisResult, diagnose
     from elastocal.interface.planning import MeasurementPlan, check, plan, simulate
     from elastocal.interface.plots import Plots
     from elastocal.interface.robots import read_robot
     from elastocal.loop.overview import Overview
+    from elastocal.loop.verification import Verification
     from elastocal.mechanics.robot import Robot
     from elastocal.validation.conformity import Conformity
     from elastocal.verdict import Effect, Verdict, read_verdict
@@ -42,6 +48,8 @@ _HOMES = {
     "Plots": "elastocal.interface.plots",
     "Robot": "elastocal.mechanics.robot",
     "Verdict": "elastocal.verdict",
+    "Verification": "elastocal.loop.verification",
+    "certify": "elastocal.interface.corrected_robot",
     "check": "elastocal.interface.planning",
     "compare": "elastocal.interface.comparison",
     "diagnose": "elastocal.interface.diagnoses",
@@ -51,6 +59,7 @@ _HOMES = {
     "read_robot": "elastocal.interface.robots",
     "read_verdict": "elastocal.verdict",
     "simulate": "elastocal.interface.planning",
+    "verify": "elastocal.interface.corrected_robot",
 }
 
 __all__ = [
@@ -67,7 +76,9 @@ __all__ = [
     "Plots",
     "Robot",
     "Verdict",
+    "Verification",
     "__version__",
+    "certify",
     "check",
     "compare",
     "diagnose",
@@ -77,6 +88,7 @@ __all__ = [
     "read_robot",
     "read_verdict",
     "simulate",
+    "verify",
 ]
 
 

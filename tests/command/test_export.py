@@ -4,7 +4,9 @@ import json
 import re
 from pathlib import Path
 
+import jsonschema
 import numpy as np
+import pandas as pd
 import pytest
 from analysed_robots import ROBOTS, analysed
 from made_urdf import joint, link
@@ -186,3 +188,54 @@ def test_an_export_into_a_folder_that_the_user_has_linked_is_written_there(
     result = elastocal("export", "made", "--output", Path("out").absolute())
     assert result.exit_code == 0, result.output
     assert (tmp_path / "elsewhere" / "robot.yaml").is_file()
+
+
+def test_further_formats_are_written_and_the_model_file_corrects_alike(
+    in_checkout, elastocal, tmp_path, path, angles
+):
+    out = tmp_path / "out"
+    formats = [f"--format={name}" for name in ("model", "evaluators", "mjcf")]
+    result = elastocal("export", "made", "--output", out, *formats)
+    assert result.exit_code == 0, result.output
+    written = {entry.name for entry in out.iterdir()}
+    assert written == {
+        "robot.yaml",
+        "robot.elastocal.json",
+        "elastocal_model.py",
+        "elastocal_model.hpp",
+        "model.schema.json",
+        "robot.xml",
+    }
+    schema = json.loads((out / "model.schema.json").read_text("utf-8"))
+    model = out / "robot.elastocal.json"
+    jsonschema.validate(json.loads(model.read_text("utf-8")), schema)
+    tables = []
+    for source in ("made", model):
+        targets = tmp_path / "targets.csv"
+        result = elastocal("correct", source, path, "--output", targets, "--force")
+        assert result.exit_code == 0, result.output
+        tables.append(pd.read_csv(targets))
+    pd.testing.assert_frame_equal(*tables, rtol=1e-9)
+
+
+def test_an_unknown_format_is_refused_before_anything_is_written(
+    in_checkout, refusal, tmp_path
+):
+    out = tmp_path / "out"
+    line = refusal("export", "made", "--output", out, "--format", "sdf")
+    assert "'sdf'" in line and "model, evaluators, mjcf" in line
+    assert not out.exists()
+
+
+def test_a_kinematics_file_of_another_robot_leaves_no_export(
+    in_checkout, refusal, tmp_path
+):
+    out = tmp_path / "out"
+    zero = "{x: 0, y: 0, z: 0, roll: 0, pitch: 0, yaw: 0}"
+    links = ("shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3")
+    original = tmp_path / "calibration.yaml"
+    lines = [f"  {link}: {zero}" for link in links]
+    original.write_text("\n".join(["kinematics:", *lines]), "utf-8")
+    line = refusal("export", "made", "--output", out, "--kinematics", original)
+    assert "another robot" in line
+    assert not out.exists()

@@ -1,6 +1,6 @@
 // Evaluate a model file at the commands of a file, for test_elastocal_model_header.py.
 //
-// evaluate MODEL REGRESSION predict|correct|extrapolated|time < rows > rows, doubles.
+// evaluate MODEL REGRESSION predict|rigid|correct|extrapolated|time < rows > rows, doubles.
 
 #include "elastocal_model.hpp"
 
@@ -74,8 +74,9 @@ int main(int, char** arguments) {
         write_row(correction.joint_angles.data(), joints);
         write_row(correction.error.data(), 6);
         write_row(&converged, 1);
-      } else if (what == "predict") {
-        const auto pose = model.predict(row.command, row.wrench, workspace);
+      } else if (what == "predict" || what == "rigid") {
+        const auto pose = what == "rigid" ? model.rigid(row.command, workspace)
+                                          : model.predict(row.command, row.wrench, workspace);
         write_row(pose.position.data(), 3);
         for (const auto& line : pose.rotation) write_row(line.data(), 3);
       } else {

@@ -57,6 +57,8 @@ def test_corrected_commands_reach_the_wanted_poses_by_the_package(name, tmp_path
     usable = by_package.status == "ok"
     assert usable.mean() > 0.9
     model = elastocal_model.load_model(path)
+    for first, second in zip(model.rigid(commands), wanted, strict=True):
+        np.testing.assert_allclose(first, second, atol=1e-12)
     correction = model.correct(*wanted, by_package.uncorrected, wrench)
     reached = predict_poses(calibrated, correction.joint_angles, wrench)
     for first, second in zip(reached, wanted, strict=True):

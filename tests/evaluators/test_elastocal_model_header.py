@@ -91,6 +91,8 @@ def test_corrected_commands_reach_the_wanted_poses_by_the_package(
     by_package = find_joint_targets(calibrated, *targets, commands)
     usable = by_package.status == "ok"
     assert usable.mean() > 0.9
+    rigid = program(path, "rigid", commands, wrench)
+    np.testing.assert_allclose(rigid[:, :3], position, atol=1e-9, rtol=0.0)
     rows = program(path, "correct", by_package.uncorrected, wrench, position, rotation)
     corrected = rows[:, : calibrated.robot.joints]
     assert rows[usable, -1].all()

@@ -160,3 +160,62 @@ def test_a_kinematics_file_of_another_robot_is_refused(result, tmp_path):
     with pytest.raises(ec.InputError, match="another robot"):
         result.robot.to_kinematics_file(tmp_path / "new.yaml", original)
     assert not (tmp_path / "new.yaml").exists()
+
+
+@pytest.fixture(scope="module")
+def measured_targets(result, nominal):
+    """Corrected targets, and where the faulty robot stands at them."""
+    bent = [0.3, -0.5, 1.0, 0.2, 0.8, 0.1]
+    poses = bent + 0.3 * np.random.default_rng(4).uniform(-1.0, 1.0, (15, 6))
+    path = result.robot.correct(wanted_poses(nominal, poses), allow_large_steps=True)
+    true_angles = path.correction.joint_angles + np.eye(nominal.joints)[1] * 2e-3
+    position, _ = compute_poses(nominal.chain, true_angles, nominal.chain.end_effector)
+    noise = 2e-5 * np.random.default_rng(5).standard_normal(position.shape)
+    return path, position + noise
+
+
+def test_a_right_prediction_holds_and_a_wrong_one_does_not(result, measured_targets):
+    path, position = measured_targets
+    verified = result.robot.verify(path, position, tolerance_m=1e-3)
+    assert verified.document["prediction"]["held"]
+    assert verified.document["certificate"]["measured"]["decision"] == "pass"
+    assert verified.document["before_rms_m"] > 1e-3
+    wrong = position + np.array([0.0, 0.0, 1e-3])
+    assert not ec.verify(result.robot, path, wrong).document["prediction"]["held"]
+
+
+def test_files_and_arrays_are_verified_alike(result, measured_targets, tmp_path):
+    path, position = measured_targets
+    path.table.to_csv(tmp_path / "targets.csv", index=False)
+    measured = pd.DataFrame(position, columns=[*"xyz"])
+    measured.to_csv(tmp_path / "measured.csv", index=False)
+    by_file = result.robot.verify(tmp_path / "targets.csv", tmp_path / "measured.csv")
+    by_array = result.robot.verify(path, position)
+    pd.testing.assert_frame_equal(by_file.table, by_array.table)
+
+
+def test_targets_that_were_not_measured_are_left_out(result, measured_targets):
+    path, position = measured_targets
+    partly = position.copy()
+    partly[3] = np.nan
+    verified = result.robot.verify(path, partly)
+    assert verified.document["not_measured"] == 1
+    assert 4 not in verified.table["target"].to_numpy()
+
+
+def test_a_model_file_verifies_alike(result, read_again, measured_targets):
+    first = read_again.verify(*measured_targets)
+    second = result.robot.verify(*measured_targets)
+    pd.testing.assert_frame_equal(first.table, second.table)
+
+
+def test_wrong_arguments_are_refused_by_name(result, measured_targets):
+    path, position = measured_targets
+    with pytest.raises(ec.InputError, match="verify: measured"):
+        result.robot.verify(path, position[:5])
+    with pytest.raises(ec.InputError, match="no position"):
+        result.robot.verify(path, np.full_like(position, np.nan))
+    with pytest.raises(ec.InputError, match=r"certify: tolerance_m.*0\.2"):
+        ec.certify(result.robot, 0.2)
+    with pytest.raises(ec.InputError, match="accepted_risk"):
+        result.robot.certify(1e-3, accepted_risk=5.0)

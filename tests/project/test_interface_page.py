@@ -31,7 +31,7 @@ def test_interface_page_has_every_public_name():
 
 def test_examples_of_the_how_to_page_run_from_top_to_bottom(tmp_path):
     examples = re.findall(r"```python\n(.*?)```", HOW_TO.read_text("utf-8"), re.DOTALL)
-    assert len(examples) == 4
+    assert len(examples) == 5
     finished = subprocess.run(
         [sys.executable, "-c", "\n".join(examples)],
         cwd=tmp_path,

@@ -337,6 +337,11 @@ class FitRecord:
     states: dict[str, Any]
     regression: RegressionFit | None
 
+    @property
+    def measures_poses(self) -> bool:
+        """Whether orientations were measured."""
+        return self.rows > len(AXES)
+
 
 @dataclass(frozen=True)
 class ModelFile:

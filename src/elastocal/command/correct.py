@@ -19,7 +19,7 @@ from elastocal.command.terminal import (
     UnitOption,
     find_workplace,
     format_command,
-    load_diagnosed_campaign,
+    load_correctable,
     parse_pairs,
     parse_units,
     print_answer,
@@ -33,7 +33,9 @@ if TYPE_CHECKING:
 
 
 def correct(
-    folder: Annotated[Path, Argument(help="Folder of a diagnosed campaign.")],
+    folder: Annotated[
+        Path, Argument(help="Folder of a diagnosed campaign, or a model file.")
+    ],
     path: Annotated[
         Path,
         Argument(
@@ -113,8 +115,8 @@ def correct(
     if not output.parent.is_dir():
         allowed = "a file in a folder that is there"
         raise InputError(output, "", "no such folder", allowed)
-    campaign = load_diagnosed_campaign(folder)
-    inputs: list[str | Path] = [*campaign.folder.files(), path]
+    campaign = load_correctable(folder)
+    inputs: list[str | Path] = [*campaign.files, path]
     check_replaceable(files, inputs, find_workplace(), force=force)
     robot = campaign.calibrated.robot
     axis_names = program.name_axes(robot) if program else ()
@@ -137,7 +139,7 @@ def correct(
     _write_targets(output, corrected, campaign.name, program, axis_names)
     note_written_files(files, find_workplace())
     details = describe_path_accuracy(corrected)
-    if details and campaign.case.campaign.measured == "position":
+    if details and not campaign.measures_poses:
         details.append(
             "orientations were not measured: a turn of the tool that positions do not"
             " show is not in their error"
@@ -157,12 +159,19 @@ def correct(
     print_answer(
         f"{corrected.share} corrected",
         details,
-        format_command("certificate", folder, "--tolerance", "0.2mm"),
+        _format_next_step(folder),
         console,
         passed=is_complete,
     )
     if not is_complete:
         raise Exit(1)
+
+
+def _format_next_step(folder: Path) -> str:
+    """Format the next command; a model file has none."""
+    if folder.is_file():
+        return ""
+    return format_command("certificate", folder, "--tolerance", "0.2mm")
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,17 @@
-"""`elastocal export`: the calibrated robot as a robot file and as a URDF."""
+"""`elastocal export`: the calibrated robot as a robot file, a URDF, the model file and
+the files of other programs."""
 
 from __future__ import annotations
 
 import math
+import shutil
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
+from elastocal import evaluators
 from elastocal.command.terminal import (
     ForceOption,
     find_workplace,
@@ -15,6 +19,7 @@ from elastocal.command.terminal import (
     print_answer,
 )
 from elastocal.counting import format_count
+from elastocal.errors import InputError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -26,6 +31,13 @@ if TYPE_CHECKING:
 
 ROBOT = "robot.yaml"
 URDF = "robot.urdf"
+MODEL = "robot.elastocal.json"
+MJCF = "robot.xml"
+KINEMATICS = "kinematics.yaml"
+SCHEMA = "model.schema.json"
+EVALUATORS = ("elastocal_model.py", "elastocal_model.hpp")
+# Files of each further format.
+FORMATS = {"model": (MODEL,), "evaluators": (*EVALUATORS, SCHEMA), "mjcf": (MJCF,)}
 # Smaller deviations of the URDF are rounding and are not mentioned.
 _ROUNDING_MM = 1e-5
 
@@ -39,6 +51,21 @@ def export(
         Option(
             help="The URDF that the robot was imported from. Its joint origins are"
             " changed, nothing else."
+        ),
+    ] = None,
+    formats: Annotated[
+        list[str] | None,
+        Option(
+            "--format",
+            help="Write more: model (the whole model as JSON), evaluators (programs that"
+            " evaluate it without elastocal), mjcf (MuJoCo). May be repeated.",
+        ),
+    ] = None,
+    kinematics: Annotated[
+        Path | None,
+        Option(
+            help="Kinematics file of the same robot: calibration.yaml of Universal Robots,"
+            " or kinematics.yaml of Franka. It is written again with calibrated frames."
         ),
     ] = None,
     force: ForceOption = False,
@@ -64,11 +91,12 @@ def export(
     from elastocal.io.atomic_writes import write_together
     from elastocal.io.replacement import check_replaceable, note_written_files
 
-    files = [output / ROBOT, output / URDF]
+    further = _FurtherFiles(tuple(formats or ()), kinematics)
+    names = [ROBOT, URDF, *further.list_names()]
+    files = [output / name for name in names]
     campaign = load_diagnosed_campaign(folder)
-    inputs = campaign.folder.files()
-    if urdf is not None:
-        inputs.append(urdf.as_posix())
+    inputs: list[str | Path] = [*campaign.folder.files()]
+    inputs += [path for path in (urdf, kinematics) if path is not None]
     check_replaceable(files, inputs, find_workplace(), force=force)
     # No file can hold the regression, so the files are of the robot without it.
     calibrated = campaign.without_regression().calibrated
@@ -82,8 +110,9 @@ def export(
     corrected = None
     if urdf is not None:
         corrected = write_calibrated_origins(urdf, nominal, folded.robot)
-    with write_together(output, (ROBOT, URDF)) as partial:
+    with write_together(output, names) as partial:
         write_robot_file(partial / ROBOT, folded, campaign.name)
+        details += further.write(campaign, partial, output)
         if corrected is not None:
             (partial / URDF).write_bytes(corrected.content)
             urdf_poses = compute_urdf_poses(
@@ -106,6 +135,59 @@ def export(
         "",
         Console(stderr=True),
     )
+
+
+@dataclass(frozen=True)
+class _FurtherFiles:
+    """Files beside the robot file and the URDF.
+
+    Attributes
+    ----------
+    formats : keys of `FORMATS`.
+    kinematics : kinematics file of the maker; None if none is written.
+    """
+
+    formats: tuple[str, ...]
+    kinematics: Path | None
+
+    def list_names(self) -> list[str]:
+        """List the names of the files; raises `InputError` for an unknown format."""
+        unknown = [name for name in self.formats if name not in FORMATS]
+        if unknown:
+            raise InputError("--format", "", repr(unknown[0]), ", ".join(FORMATS))
+        names = [name for key in dict.fromkeys(self.formats) for name in FORMATS[key]]
+        return names if self.kinematics is None else [*names, KINEMATICS]
+
+    def write(
+        self, campaign: DiagnosedCampaign, folder: Path, output: Path
+    ) -> list[str]:
+        """Write the files to a folder; return what they lack and where they will be."""
+        from elastocal.application.model_file import build_model_schema
+        from elastocal.interface.corrected_robot import CorrectedRobot
+        from elastocal.io.json_files import write_json
+        from elastocal.report.words import format_candidate, join_items
+
+        robot = CorrectedRobot(campaign.calibrated, campaign.verdict)
+        details = []
+        if "model" in self.formats:
+            robot.save(folder / MODEL)
+        if "evaluators" in self.formats:
+            sources = Path(evaluators.__path__[0])
+            for name in EVALUATORS:
+                shutil.copyfile(sources / name, folder / name)
+            write_json(folder / SCHEMA, build_model_schema())
+        if "mjcf" in self.formats:
+            left_out = robot.to_mjcf(folder / MJCF)
+            if left_out:
+                effects = join_items(map(format_candidate, left_out))
+                details.append(f"! {MJCF} does not hold {effects}")
+        if self.kinematics is not None:
+            deviation_m = robot.to_kinematics_file(folder / KINEMATICS, self.kinematics)
+            details.append(
+                f"{KINEMATICS} deviates from the calibrated geometry by up to"
+                f" {1e3 * deviation_m:.4f} mm"
+            )
+        return [*details, *(str(output / name) for name in self.list_names())]
 
 
 def _describe_losses(

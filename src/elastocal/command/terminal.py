@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 import re
 import shlex
+from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -21,7 +22,9 @@ if TYPE_CHECKING:
     import numpy as np
     from rich.console import Console
 
+    from elastocal.application.calibrated import CalibratedRobot
     from elastocal.loop.calibrated_files import DiagnosedCampaign
+    from elastocal.verdict import Verdict
 
 _METRES = {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "m": 1.0}
 _RADIANS = {
@@ -297,6 +300,49 @@ def load_diagnosed_campaign(folder: Path) -> DiagnosedCampaign:
         )
         print_lines([warning], Console(stderr=True))
     return campaign
+
+
+@dataclass(frozen=True)
+class Correctable:
+    """A robot that can correct targets, from a diagnosed campaign or a model file.
+
+    Attributes
+    ----------
+    name : name of its campaign.
+    calibrated : the robot.
+    verdict : verdict on the campaign.
+    measures_poses : whether orientations were measured.
+    files : files from which it comes.
+    """
+
+    name: str
+    calibrated: CalibratedRobot
+    verdict: Verdict
+    measures_poses: bool
+    files: list[str | Path]
+
+
+def load_correctable(source: Path) -> Correctable:
+    """Load a robot from the folder of a diagnosed campaign, or from a model file."""
+    if source.is_file():
+        from elastocal.application.model_file import read_model_file, restore_calibrated
+
+        contents = read_model_file(source)
+        return Correctable(
+            contents.campaign,
+            restore_calibrated(contents, source),
+            contents.verdict,
+            contents.fit.measures_poses,
+            [source],
+        )
+    campaign = load_diagnosed_campaign(source)
+    return Correctable(
+        campaign.name,
+        campaign.calibrated,
+        campaign.verdict,
+        campaign.case.campaign.measured == "pose",
+        [*campaign.folder.files()],
+    )
 
 
 def _list_versions(environment: Mapping[str, str], names: Iterable[str]) -> str:

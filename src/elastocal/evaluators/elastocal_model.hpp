@@ -470,6 +470,9 @@ class Model {
 
   std::size_t joints() const { return joints_; }
 
+  // Names of the joints, or joint1 and so on if the model has none.
+  const std::vector<std::string>& joint_names() const { return joint_names_; }
+
   // Predict where the robot comes to rest at commands, as the controller reports them.
   Pose predict(const std::vector<double>& joint_angles, const Wrench& wrench,
                Workspace& workspace) const {
@@ -479,6 +482,14 @@ class Model {
     const Vector3 moved = correct_residual(wrench, workspace);
     for (int i = 0; i < 3; ++i) pose.position[i] += moved[i];
     return pose;
+  }
+
+  // Pose of the rigid, nominal robot at a command, for which an uncorrected program was
+  // made.
+  Pose rigid(const std::vector<double>& joint_angles, Workspace& workspace) const {
+    set_angles(joint_angles, workspace);
+    walk(workspace, true);
+    return get_pose(workspace);
   }
 
   // Decide whether a command is beyond the fitted joint angles and loads.
@@ -528,6 +539,7 @@ class Model {
 
   std::size_t joints_ = 0;
   std::size_t coordinates_ = 0;
+  std::vector<std::string> joint_names_;
   int iterations_ = 0;
   std::vector<double> matrix_, inverse_, offset_;
   std::vector<detail::Transform> transforms_;
@@ -561,6 +573,7 @@ class Model {
     inverse_ = invert(matrix_, joints_);
     end_offset_ = kinematics.at("end_effector_offset_m").vector();
     gravity_ = kinematics.at("gravity_m_s2").vector();
+    read_joint_names(json.at("robot"));
     read_transforms(kinematics);
     for (const detail::Json& body : kinematics.at("bodies").items)
       bodies_.push_back(read_body(body, "mass_kg", "moment_kg_m"));
@@ -576,6 +589,12 @@ class Model {
     const detail::Json* format = json.find("format");
     if (!format || format->text != "elastocal model" || json.integer("version") != version)
       throw std::runtime_error("no elastocal model of version " + std::to_string(version));
+  }
+
+  void read_joint_names(const detail::Json& robot) {
+    const detail::Json* names = robot.find("joint_names");
+    for (std::size_t joint = 0; joint < joints_; ++joint)
+      joint_names_.push_back(names ? names->items.at(joint).text : "joint" + std::to_string(joint + 1));
   }
 
   void read_transforms(const detail::Json& kinematics) {

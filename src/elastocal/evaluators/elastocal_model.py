@@ -97,6 +97,13 @@ class Model:
         position, rotation, loads = self._come_to_rest(angles, wrench)
         return position + self._correct_residual(angles, wrench, loads), rotation
 
+    def rigid(self, joint_angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Poses of the rigid, nominal robot at commands, for which an uncorrected
+        program was made; as `predict`."""
+        angles, _ = self._check(joint_angles, None)
+        end = self._walk(self._place(angles))
+        return end.point, end.rotation[-1]
+
     def is_extrapolated(
         self, joint_angles: np.ndarray, wrenches: np.ndarray | None = None
     ) -> np.ndarray:

@@ -182,6 +182,34 @@ def read_corrected_targets(path: str | Path, joints: int) -> CorrectedTargets:
     )
 
 
+def arrange_corrected_targets(table: pd.DataFrame, joints: int) -> CorrectedTargets:
+    """Arrange a table of joint targets in memory, as `read_corrected_targets`."""
+    usable = table["status"].map(is_corrected).to_numpy(bool)
+    rotation = np.full((len(usable), 3, 3), np.nan)
+    vectors = table[[*ROTATION]].to_numpy(float)
+    rotation[usable] = Rotation.from_rotvec(vectors[usable]).as_matrix()
+    angles = [f"q{joint}" for joint in range(1, joints + 1)]
+    return CorrectedTargets(
+        usable,
+        table[angles].to_numpy(float),
+        table[[*WRENCH_NAMES]].to_numpy(float),
+        table[[*POSITION]].to_numpy(float),
+        rotation,
+        *(table[name].to_numpy(float) for name in (*_ERRORS, _BOUND)),
+    )
+
+
+def arrange_positions(
+    targets: CorrectedTargets, position: np.ndarray, reflector: str
+) -> TargetMeasurements:
+    """Arrange measured positions (N, 3) of one reflector at all N targets, m; NaN where
+    it was not measured."""
+    row = np.flatnonzero(targets.usable & ~np.isnan(position).any(axis=1))
+    names = np.array([reflector] * len(row))
+    repeat = np.zeros(len(row), int)
+    return TargetMeasurements(row, repeat, names, position[row], None, {})
+
+
 def is_corrected(status: str) -> bool:
     """Whether a row of this status has joint targets."""
     return status == OK or status.startswith(NO_BOUND.strip())

@@ -30,6 +30,12 @@ from elastocal.exchange.makers_kinematics import (
     find_deviation_m,
     read_makers_file,
 )
+from elastocal.exchange.measured_targets import (
+    arrange_corrected_targets,
+    arrange_positions,
+    read_corrected_targets,
+    read_target_measurements,
+)
 from elastocal.exchange.target_path import (
     TargetPath,
     build_target_path,
@@ -38,19 +44,27 @@ from elastocal.exchange.target_path import (
 from elastocal.exchange.urdf_writing import build_urdf, write_calibrated_origins
 from elastocal.interface.arrays import check_array
 from elastocal.io.atomic_writes import write_atomically, write_text
-from elastocal.loop.calibrated_files import decide_by_prediction
+from elastocal.loop.calibrated_files import decide_on_campaign
+from elastocal.loop.verification import (
+    Verification,
+    get_targets,
+    list_reflectors,
+    verify_robot,
+)
 from elastocal.mechanics.components import WRENCH_NAMES
-from elastocal.validation.conformity import Conformity, list_shortfalls
 
 if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import ArrayLike
 
     from elastocal.mechanics.robot import Robot
+    from elastocal.validation.conformity import Conformity
     from elastocal.verdict import Verdict
 
 # What messages name as the source of a wrong argument.
 _SOURCE = "CorrectedRobot"
+# Upper bound on a tolerance: a larger one is in millimetres.
+_LARGEST_TOLERANCE_M = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,14 +170,69 @@ class CorrectedRobot:
         accepted_risk : float
             Accepted probability of a wrong decision.
         """
+        _check_tolerance("certify", tolerance_m, accepted_risk)
         commands = select_campaign_commands(self.calibrated)
         prediction = predict_errors(self.calibrated, *commands)
-        shortfalls = list_shortfalls(
-            self.verdict.heldout.configurations, self.calibrated.states, self.nominal
+        decision, _ = decide_on_campaign(
+            self.calibrated, self.verdict, prediction, tolerance_m, accepted_risk
         )
-        return decide_by_prediction(prediction, shortfalls, tolerance_m, accepted_risk)[
-            0
-        ]
+        return decision
+
+    def verify(
+        self,
+        targets: CorrectedPath | str | Path,
+        measured: ArrayLike | str | Path,
+        *,
+        tolerance_m: float | None = None,
+        accepted_risk: float = 0.05,
+    ) -> Verification:
+        """Compare the corrected robot, measured at its targets, with its prediction.
+
+        Parameters
+        ----------
+        targets : CorrectedPath, str or path
+            Result of `correct`, or the CSV that `elastocal correct` has written.
+        measured : (N, 3) array, str or path
+            Position of the campaign's reflector on the end effector at each row of the
+            targets' table, m, NaN where it was not measured; or a CSV with ``x, y, z``.
+        tolerance_m : float, optional
+            Largest allowed RMS position error, m.
+        accepted_risk : float
+            Accepted probability of a wrong decision.
+
+        Returns
+        -------
+        Verification
+            Its `document` has the errors before, predicted and measured, whether the
+            prediction held, whether an error remains that repeats, and the decision on
+            the tolerance; its `table` has a row for each target.
+
+        Raises
+        ------
+        InputError
+            Names the argument, or the file and line, what was found and what is allowed.
+        """
+        if tolerance_m is not None:
+            _check_tolerance("verify", tolerance_m, accepted_risk)
+        known = [*get_targets(self.calibrated).values()]
+        reflectors = list_reflectors(known, self.nominal, "verify")
+        joints = self.nominal.joints
+        if isinstance(targets, (str, Path)):
+            corrected = read_corrected_targets(targets, joints)
+        else:
+            corrected = arrange_corrected_targets(targets.table, joints)
+        if isinstance(measured, (str, Path)):
+            measurements = read_target_measurements(
+                measured, corrected, self.nominal, reflectors
+            )
+        else:
+            position = check_array("verify", "measured", measured, (len(corrected), 3))
+            measurements = arrange_positions(corrected, position, reflectors[0])
+        if not len(measurements):
+            raise InputError("verify", "measured", "no position", "measured targets")
+        return verify_robot(
+            self.calibrated, corrected, measurements, tolerance_m, accepted_risk
+        )
 
     def save(self, path: str | Path) -> None:
         """Write the whole model, with its uncertainty and its verdict, as one JSON file.
@@ -274,6 +343,37 @@ def read_model(path: str | Path) -> CorrectedRobot:
     """
     contents = read_model_file(path)
     return CorrectedRobot(restore_calibrated(contents, path), contents.verdict)
+
+
+def certify(
+    robot: CorrectedRobot, tolerance_m: float, accepted_risk: float = 0.05
+) -> Conformity:
+    """Decide whether a corrected robot keeps a tolerance, as `CorrectedRobot.certify`."""
+    return robot.certify(tolerance_m, accepted_risk)
+
+
+def verify(
+    robot: CorrectedRobot,
+    targets: CorrectedPath | str | Path,
+    measured: ArrayLike | str | Path,
+    *,
+    tolerance_m: float | None = None,
+    accepted_risk: float = 0.05,
+) -> Verification:
+    """Compare a corrected robot, measured at its targets, with its prediction, as
+    `CorrectedRobot.verify`."""
+    return robot.verify(
+        targets, measured, tolerance_m=tolerance_m, accepted_risk=accepted_risk
+    )
+
+
+def _check_tolerance(source: str, tolerance_m: float, accepted_risk: float) -> None:
+    if not 0.0 < tolerance_m < _LARGEST_TOLERANCE_M:
+        allowed = f"a length in metres, below {_LARGEST_TOLERANCE_M:g} m"
+        raise InputError(source, "tolerance_m", repr(tolerance_m), allowed)
+    if not 0.0 < accepted_risk < 1.0:
+        allowed = "a probability"
+        raise InputError(source, "accepted_risk", repr(accepted_risk), allowed)
 
 
 def _arrange_path(table: pd.DataFrame, joints: int) -> TargetPath:

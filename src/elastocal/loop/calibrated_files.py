@@ -243,15 +243,12 @@ def build_certificate(
     verdict = campaign.verdict
     heldout = verdict.heldout
     robot = calibrated.robot
-    states = campaign.case.observations.states
+    states = calibrated.states
     commands = select_campaign_commands(calibrated)
     prediction = predict_errors(calibrated, *commands)
     accuracy = prediction.summarize(REGION)
-    decision, missing = decide_by_prediction(
-        prediction,
-        list_shortfalls(heldout.configurations, states, robot),
-        tolerance_m,
-        accepted_risk,
+    decision, missing = decide_on_campaign(
+        calibrated, verdict, prediction, tolerance_m, accepted_risk
     )
     budget = {"before": heldout.before.rms_m}
     budget |= compute_error_budget(calibrated, *commands)
@@ -287,6 +284,33 @@ def build_certificate(
         "budget_states": accuracy.poses,
         "tracker_rms_m": float(np.sqrt(3.0) * calibrated.noise.position_m),
     }
+
+
+def decide_on_campaign(
+    calibrated: CalibratedRobot,
+    verdict: Verdict,
+    prediction: ErrorPrediction,
+    tolerance_m: float,
+    accepted_risk: float,
+) -> tuple[Conformity, list[str]]:
+    """Decide whether a corrected robot keeps a tolerance over its campaign, as
+    `decide_by_prediction`.
+
+    Parameters
+    ----------
+    calibrated : CalibratedRobot
+        The robot with the states of its campaign.
+    verdict : Verdict
+        Tells how many configurations judge it.
+    prediction : ErrorPrediction
+        Errors at the poses and loads of the campaign.
+    tolerance_m, accepted_risk : float
+        As in `decide_by_prediction`.
+    """
+    shortfalls = list_shortfalls(
+        verdict.heldout.configurations, calibrated.states, calibrated.robot
+    )
+    return decide_by_prediction(prediction, shortfalls, tolerance_m, accepted_risk)
 
 
 def decide_by_prediction(

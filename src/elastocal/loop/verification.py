@@ -45,12 +45,13 @@ from elastocal.io.atomic_writes import write_text, write_together
 from elastocal.io.documents import LARGEST_BYTES
 from elastocal.io.records import compute_sha256
 from elastocal.io.texts import read_text
-from elastocal.loop.diagnosis_tables import restore_step_model
 from elastocal.loop.loading import read_described_campaign
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.validation.conformity import PASS, UNDECIDED, decide_conformity
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import pandas as pd
 
     from elastocal.application.accuracy import ErrorPrediction
@@ -106,20 +107,25 @@ def read_verification(
     """
     robot = campaign.robot
     targets = read_corrected_targets(targets_path, robot.joints)
-    names = [target.name for target in _find_end_targets(campaign)]
-    if not names:
-        end = robot.chain.end_effector.name
-        allowed = f"a campaign with a target on {end}, the point that is corrected"
-        raise InputError(path, "", "measurements of another point", allowed)
+    names = list_reflectors(campaign.targets, robot, path)
     measured = read_target_measurements(path, targets, robot, names, lengths or "m")
     return targets, measured
 
 
-def _find_end_targets(campaign: Campaign) -> list[Target]:
-    """Find the targets on the end effector, those at a stated offset first."""
-    end = campaign.robot.chain.end_effector.name
-    targets = [target for target in campaign.targets if target.point == end]
-    return sorted(targets, key=lambda target: target.offset_m is None)
+def list_reflectors(
+    targets: Sequence[Target], robot: Robot, source: str | Path
+) -> list[str]:
+    """List the targets on the end effector, those at a stated offset first.
+
+    Raises `InputError`, which names `source`, if there is none.
+    """
+    end = robot.chain.end_effector.name
+    at_end = [target for target in targets if target.point == end]
+    if not at_end:
+        allowed = f"a campaign with a target on {end}, the point that is corrected"
+        raise InputError(source, "", "measurements of another point", allowed)
+    at_end.sort(key=lambda target: target.offset_m is None)
+    return [target.name for target in at_end]
 
 
 def verify_campaign(
@@ -140,23 +146,44 @@ def verify_campaign(
     tolerance_m : largest allowed RMS position error, m; None if nothing is certified.
     accepted_risk : accepted probability of a wrong decision.
     """
-    target = _choose_target(campaign.case.campaign, measured)
     robot = campaign.calibrated.robot
+    verified = verify_robot(
+        campaign.calibrated, targets, measured, tolerance_m, accepted_risk
+    )
+    document = {
+        "campaign": campaign.name,
+        "robot": robot.name,
+        "serial": campaign.folder.document.get("serial_number", ""),
+        "date": date.today().isoformat(),
+        "version": __version__,
+        "origin": campaign.origin,
+        "files": campaign.folder.digests
+        | {role: compute_sha256(path) for role, path in files.items()},
+    }
+    return Verification(document | verified.document, verified.table)
+
+
+def verify_robot(
+    calibrated: CalibratedRobot,
+    targets: CorrectedTargets,
+    measured: TargetMeasurements,
+    tolerance_m: float | None,
+    accepted_risk: float,
+) -> Verification:
+    """Compare the measured errors of a corrected robot with the predicted ones, as
+    `verify_campaign`; the document has the errors, the tests and the certificate.
+
+    `calibrated` is the robot with its whole fit.
+    """
+    target = _choose_target(calibrated, measured)
+    robot = calibrated.robot
     commanded = _average_measurements(robot, targets, measured, target.name)
-    comparison = _compare(campaign, commanded, target)
+    comparison = _compare(calibrated, commanded, target)
     certificate = None
     if tolerance_m is not None:
         certificate = _certify(comparison, tolerance_m, accepted_risk)
     document = (
         {
-            "campaign": campaign.name,
-            "robot": robot.name,
-            "serial": campaign.folder.document.get("serial_number", ""),
-            "date": date.today().isoformat(),
-            "version": __version__,
-            "origin": campaign.origin,
-            "files": campaign.folder.digests
-            | {role: compute_sha256(path) for role, path in files.items()},
             "target": target.name,
             "offset_fitted": target.offset_m is None,
             "not_measured": int(targets.usable.sum()) - len(commanded),
@@ -195,14 +222,13 @@ class _Comparison:
 
 
 def _compare(
-    campaign: DiagnosedCampaign, targets: CommandedTargets, target: Target
+    calibrated: CalibratedRobot, targets: CommandedTargets, target: Target
 ) -> _Comparison:
     """Compare measured with predicted errors."""
-    calibrated = campaign.calibrated
     noise = calibrated.noise
     errors = compute_measured_errors(
         targets,
-        _relate_to_end_effector(target, campaign),
+        _relate_to_end_effector(target, calibrated),
         base_known=calibrated.scope.frame == BASE,
     )
     sensor_m = noise.position_m / np.sqrt(targets.repeats)
@@ -280,26 +306,32 @@ def _describe_errors(comparison: _Comparison, accepted_risk: float) -> dict[str,
     }
 
 
-def _choose_target(campaign: Campaign, measured: TargetMeasurements) -> Target:
+def get_targets(calibrated: CalibratedRobot) -> dict[str, Target]:
+    """Get the targets of the campaign behind a robot, by name."""
+    assert calibrated.fit is not None, "a robot without a campaign has no targets"
+    return {target.name: target for target in calibrated.fit.model.targets}
+
+
+def _choose_target(calibrated: CalibratedRobot, measured: TargetMeasurements) -> Target:
     """Choose the target on the end effector whose errors are stated."""
     present = set(measured.target.tolist())
-    return next(
-        target for target in _find_end_targets(campaign) if target.name in present
-    )
+    targets = get_targets(calibrated)
+    names = list_reflectors([*targets.values()], calibrated.robot, "measured")
+    return next(targets[name] for name in names if name in present)
 
 
 def _relate_to_end_effector(
-    target: Target, campaign: DiagnosedCampaign
+    target: Target, calibrated: CalibratedRobot
 ) -> tuple[float, ...] | None:
     """Return the offset of a target from the corrected point, in its frame, as the
     diagnosis has estimated it; None if the campaign does not declare it."""
     if target.offset_m is None:
         return None
-    case = campaign.case
-    _, estimate = restore_step_model(case, campaign.facts["steps"][-1])
-    number = [at_point.name for at_point in case.campaign.targets].index(target.name)
-    point = case.campaign.robot.chain.end_effector.offset_m
-    return tuple((estimate.target_offset[number] - np.array(point)).tolist())
+    assert calibrated.fit is not None, "a robot without a campaign has no targets"
+    number = [*get_targets(calibrated)].index(target.name)
+    offset_m = calibrated.fit.estimate.target_offset[number]
+    point = calibrated.robot.chain.end_effector.offset_m
+    return tuple((offset_m - np.array(point)).tolist())
 
 
 def _average_measurements(
