@@ -17,7 +17,7 @@ from elastocal.application.calibrated import compute_nominal_poses, predict_pose
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.reading import read_campaign
 from elastocal.command import campaign as campaign_command
-from elastocal.loop import verification
+from elastocal.loop import calibrated_files
 from elastocal.loop.calibrated_files import load_diagnosed
 from elastocal.loop.diagnosis_tables import restore_step_model
 
@@ -124,7 +124,7 @@ def test_a_reflector_sits_where_the_diagnosis_has_estimated_it(loop, monkeypatch
     loop.write(loop.move() + loop.rotation @ offset_m)
     _, document = loop.verify()
     assert not document["prediction"]["held"]
-    monkeypatch.setattr(verification, "restore_step_model", restore_with_offset)
+    monkeypatch.setattr(calibrated_files, "restore_step_model", restore_with_offset)
     _, document = loop.verify()
     assert document["prediction"]["held"]
 
