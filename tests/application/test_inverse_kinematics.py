@@ -1,19 +1,17 @@
 """Joint angles for wanted poses: within limits, without large steps, with the least
 motion."""
 
-import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from analysed_robots import analysed
+from made_chains import perturb_axes
 from scipy.interpolate import PchipInterpolator
 
 from elastocal.application import inverse_kinematics
 from elastocal.application.inverse_kinematics import (
     SOLVED_M,
-    _find_least_motion,
-    _PathCandidates,
     compute_allowed_steps,
     find_beyond_limits,
     solve_path,
@@ -51,42 +49,6 @@ def compute_motion_cost(step, allowed):
     return (step + EXCESS_WEIGHT * excess).sum(axis=-1)
 
 
-def find_least_cost(lowest, counts, limits, allowed):
-    """Cost of the best path through all combinations of postures and turns."""
-    turns = np.array(list(itertools.product(*map(range, counts))))
-    previous = total = None
-    for row in range(lowest.shape[1]):
-        angles = (lowest[:, row, None] + 2 * np.pi * turns).reshape(-1, len(counts))
-        cost = np.where((angles > limits[:, 1]).any(axis=1), np.inf, 0.0)
-        if row:
-            step = np.abs(angles[:, None] - previous[None])
-            motion = compute_motion_cost(step, allowed[row - 1])
-            cost += (motion + total).min(axis=1)
-        previous = angles
-        total = cost
-    return total.min()
-
-
-def test_the_least_motion_is_the_best_of_all_paths_through_all_postures_and_turns():
-    stream = np.random.default_rng(2)
-    counts = (1, 2, 3)
-    limits = np.array([[-4.0, 4.0], [-4.0, 7.0], [-4.0, 14.0]])
-    for _ in range(10):
-        lowest = stream.uniform(-3, 3, (2, 4, 3))
-        allowed = stream.uniform(0.5, 3, (3, 3))
-        copies = [
-            lowest[..., joint, None] + 2 * np.pi * np.arange(count)
-            for joint, count in enumerate(counts)
-        ]
-        path = _find_least_motion(
-            _PathCandidates(copies, limits, np.zeros((2, 4)), allowed)
-        )
-        step = np.abs(np.diff(path, axis=0))
-        least_cost = find_least_cost(lowest, counts, limits, allowed)
-        cost = compute_motion_cost(step, allowed).sum()
-        assert cost == pytest.approx(least_cost, abs=1e-2)
-
-
 def test_a_step_may_be_five_times_the_rotation_of_the_path_and_ten_degrees():
     robot = analysed("gp180")
     angles = np.tile(robot.joint_limits.mean(axis=1) + BENT, (2, 1))
@@ -105,14 +67,14 @@ def interpolate_path(robot, count):
     return compute_poses(robot.chain, angles, robot.chain.end_effector)
 
 
-@pytest.mark.parametrize("name", ["kuka", "gp180"])
+@pytest.mark.parametrize("name", ["kuka", "gp180", "ur10"])
 def test_a_path_in_closed_form_is_no_longer_than_one_from_random_starts(
     name, monkeypatch
 ):
     robot = analysed(name)
     wanted = interpolate_path(robot, 60)
     path, error_m = solve_path(robot, *wanted)
-    monkeypatch.setattr(inverse_kinematics, "find_spherical_wrist", lambda chain: None)
+    monkeypatch.setattr(inverse_kinematics, "find_closed_form", lambda chain: None)
     from_random_starts, _ = solve_path(robot, *wanted)
     assert error_m.max() < SOLVED_M and not find_beyond_limits(robot, path).any()
     allowed = compute_allowed_steps(robot, *wanted)
@@ -134,6 +96,33 @@ def test_a_path_through_aligned_wrists_keeps_the_angles_of_its_neighbours():
     robot = replace(robot, joint_limits=limits)
     angles[:, 3] = np.radians(50.0)
     angles[:, 4] = np.radians(np.abs(np.linspace(-20.0, 20.0, 21)))
+    angles[8:13, 4] = 0.0
+    angles[8:13, 0] += np.radians([0.0, 0.5, 1.0, 0.5, 0.0])
+    wanted = compute_poses(robot.chain, angles, robot.chain.end_effector)
+    path, error_m = solve_path(robot, *wanted)
+    assert error_m.max() < SOLVED_M
+    steps = np.abs(np.diff(path, axis=0))
+    assert (steps <= compute_allowed_steps(robot, *wanted)).all()
+
+
+@pytest.mark.parametrize("name", ["kuka", "ur10"])
+def test_a_robot_with_calibrated_axes_starts_from_the_closed_form(name, monkeypatch):
+    robot = analysed(name)
+    robot = replace(robot, chain=perturb_axes(robot.chain, 5e-4))
+    wanted = interpolate_path(robot, 60)
+    monkeypatch.setattr(inverse_kinematics, "_solve_from_anchors", None)
+    path, error_m = solve_path(robot, *wanted)
+    assert error_m.max() < SOLVED_M and not find_beyond_limits(robot, path).any()
+    steps = np.abs(np.diff(path, axis=0))
+    assert (steps <= compute_allowed_steps(robot, *wanted)).all()
+
+
+def test_a_path_through_an_aligned_wrist_of_parallel_axes_is_continued():
+    """With joint 5 at zero axis 6 is parallel to axes 2 to 4: any angle of joint 6 has
+    the orientation, but few of them the position."""
+    robot = analysed("ur10")
+    angles = np.tile([0.3, -1.2, 1.5, -0.8, 0.0, 0.4], (21, 1))
+    angles[:, 4] = np.abs(np.linspace(-0.3, 0.3, 21))
     angles[8:13, 4] = 0.0
     angles[8:13, 0] += np.radians([0.0, 0.5, 1.0, 0.5, 0.0])
     wanted = compute_poses(robot.chain, angles, robot.chain.end_effector)

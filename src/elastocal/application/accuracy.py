@@ -284,8 +284,12 @@ class _RandomRobots:
         """Simulate position errors (K, 3, draws) from factors (K, 3, P) and (K, 3, n) of
         their covariances."""
         shape = (*by_repeats.shape[::2], len(self.repeatability_scale))
-        repeats = self.repeatability_scale * self.stream.standard_normal(shape)
-        return by_parameters @ self.standard_normal + by_repeats @ repeats
+        errors = by_repeats @ self.stream.standard_normal(shape)
+        errors *= self.repeatability_scale
+        # One product of two matrices is faster than one for each pose.
+        flat = by_parameters.reshape(-1, by_parameters.shape[2])
+        errors += (flat @ self.standard_normal).reshape(errors.shape)
+        return errors
 
 
 def _draw_robots(calibrated: CalibratedRobot, draws: int) -> _RandomRobots:
@@ -368,7 +372,7 @@ def _predict_chunk(
     if regression.active.any():
         std = np.sqrt(additional[0] / 3.0)
         errors += std[:, None, None] * robots.stream.standard_normal(errors.shape)
-    squares = (errors**2).sum(axis=1)
+    squares = np.einsum("kid,kid->kd", errors, errors)
     return _ChunkErrors(
         parameter_covariance,
         repeat_covariance,

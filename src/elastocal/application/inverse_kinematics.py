@@ -1,17 +1,15 @@
 """Joint angles of the rigid robot for wanted poses, in closed form or by damped least
 squares from several starts, and a path through them without jumps.
 
-An arm with a spherical wrist has eight postures in closed form, see `spherical_wrist`.
-For other arms each step is that of Levenberg and Marquardt [1] on the pose error, in
+Many arms of six joints have eight postures in closed form, see `closed_form`. For other
+arms each step is that of Levenberg and Marquardt [1] on the pose error, in
 which rotations count as lengths at the reach of the arm; it is batched over targets and
 starts. All
-solutions of all rows, and their copies whole turns away, are candidates for the path.
-Chosen is a path without large steps if there is one, and among these the path along
-which the joints move least, by dynamic programming (Viterbi's algorithm [2]).
+solutions of all rows, and their copies whole turns away, are candidates for the path, see
+`least_motion`.
 
 [1] Siciliano, B., Sciavicco, L., Villani, L. and Oriolo, G., Robotics: Modelling,
 Planning and Control, section 3.7, Springer, 2009.
-[2] Forney, G. D., The Viterbi algorithm, Proceedings of the IEEE 61, 1973.
 """
 
 from __future__ import annotations
@@ -21,10 +19,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.spherical_wrist import (
-    SphericalWristArm,
-    find_spherical_wrist,
-    solve_all_postures,
+from elastocal.application.closed_form import ClosedFormArm, find_closed_form
+from elastocal.application.least_motion import (
+    JOINT_ROUNDING,
+    PathCandidates,
+    find_least_motion,
 )
 from elastocal.mechanics.kinematics import (
     compute_jacobians,
@@ -47,8 +46,6 @@ SOLVED_M = 1e-7
 # Jacobian is below this value; the sign of the determinant then does not identify a
 # posture, and more than rounding of joint angles changes the pose by less than rounding.
 SINGULAR_DETERMINANT = 1e-6
-# Rounding errors of joint angles at their limits (rad, or m).
-_ROUNDING = 1e-9
 # Solutions that differ by less (rad, or m) are one.
 _SAME = 1e-6
 # Initial damping in units of the trace of J J', factors after a step that fails or
@@ -73,12 +70,6 @@ STEP_ALLOWANCE = np.radians(10.0)
 # Copies of a solution that differ by whole turns are candidates too, within two turns
 # of the middle of the limits.
 _MOST_TURNS = 4
-# Weights of the path's cost beside its length: the excess of steps that are too large
-# comes first, the distance from the middle of the limits last.
-_EXCESS_WEIGHT = 1e4
-_MIDDLE_WEIGHT = 1e-5
-# Rows of a path whose costs are in memory at once.
-_BLOCK = 512
 # Longest step of a joint in an iteration, rad or m; the linearization is valid for no
 # longer ones.
 _LONGEST_STEP = 0.5
@@ -190,7 +181,7 @@ def _compute_damped_steps(
 def find_beyond_limits(robot: Robot, angles: np.ndarray) -> np.ndarray:
     """Find joints outside of their limits by more than rounding, (..., n) bool."""
     low, high = robot.joint_limits.T
-    return (angles < low - _ROUNDING) | (angles > high + _ROUNDING)
+    return (angles < low - JOINT_ROUNDING) | (angles > high + JOINT_ROUNDING)
 
 
 def compute_allowed_steps(
@@ -242,7 +233,7 @@ def solve_path(
     -------
     angles, error_m : (N, n) and (N,) as in `solve_poses`.
     """
-    arm = find_spherical_wrist(robot.chain)
+    arm = find_closed_form(robot.chain)
     if arm is None:
         solutions = _solve_from_anchors(robot, position, rotation)
     else:
@@ -259,7 +250,7 @@ def solve_path(
     # the starts of a row have missed, and nearby solutions where there are infinitely
     # many: of a singular posture, or of an arm with more joints than it needs.
     rows = np.arange(len(position))
-    if arm is not None:
+    if arm is not None and arm.is_exact:
         rows = np.flatnonzero(_find_singular(robot, solutions).any(axis=0))
     if not len(rows):
         return path, path_error_m
@@ -296,11 +287,11 @@ def _find_singular(robot: Robot, solutions: _Solutions) -> np.ndarray:
 
 
 def _solve_in_closed_form(
-    robot: Robot, arm: SphericalWristArm, position: np.ndarray, rotation: np.ndarray
+    robot: Robot, arm: ClosedFormArm, position: np.ndarray, rotation: np.ndarray
 ) -> _Solutions:
     """Find all postures of each row; those that do not reach it have an infinite
     error."""
-    angles, is_reached = solve_all_postures(arm, position, rotation)
+    angles, is_reached = arm.solve_all_postures(position, rotation)
     error_m = np.full(is_reached.shape, np.inf)
     _, row = np.nonzero(is_reached)
     angles[is_reached], error_m[is_reached] = solve_poses(
@@ -401,13 +392,13 @@ def _choose_path(
     if len(rows):
         most = usable.sum(axis=0).max()
         order = np.argsort(~usable[:, rows], axis=0, kind="stable")[:most]
-        candidates = _PathCandidates(
+        candidates = PathCandidates(
             copies=_copy_postures(robot, lowest[order, rows], limits),
             limits=limits,
             exclusion=np.where(usable[order, rows], 0.0, np.inf),
             allowed=compute_allowed_steps(robot, position[rows], rotation[rows]),
         )
-        path[rows] = _find_least_motion(candidates)
+        path[rows] = find_least_motion(candidates)
     largest_error_m = np.where(usable, error_m, 0.0).max(axis=0)
     return path, np.where(is_solved, largest_error_m, error_m[best])
 
@@ -416,7 +407,7 @@ def _move_into_limits(robot: Robot, angles: np.ndarray) -> np.ndarray:
     """Subtract whole turns from angles (..., n), so that each is the lowest one above its
     lower limit."""
     low = _narrow_limits(robot)[:, 0]
-    turns = np.floor((angles - low + _ROUNDING) / _find_periods(robot))
+    turns = np.floor((angles - low + JOINT_ROUNDING) / _find_periods(robot))
     return angles - np.where(robot.chain.prismatic, 0.0, 2 * np.pi * turns)
 
 
@@ -434,7 +425,7 @@ def _copy_postures(
     Returns angles (K, N, turns) of each joint.
     """
     width = limits[:, 1] - limits[:, 0]
-    turns = np.ceil(width / _find_periods(robot) - _ROUNDING)
+    turns = np.ceil(width / _find_periods(robot) - JOINT_ROUNDING)
     counts = np.maximum(1, turns).astype(int)
     return [
         postures[..., joint, None] + 2 * np.pi * np.arange(count)
@@ -467,121 +458,3 @@ def _find_distinct(angles: np.ndarray, candidate: np.ndarray) -> np.ndarray:
         repeated = (distance < _SAME) & distinct[:number]
         distinct[number] &= ~repeated.any(axis=0)
     return distinct
-
-
-@dataclass(frozen=True)
-class _PathCandidates:
-    """Up to K postures of each of N rows, each with copies whole turns away, and what a
-    path through them costs.
-
-    Attributes
-    ----------
-    copies : for each joint, its angles (K, N, turns): the lowest one within the limits,
-        and those whole turns above.
-    limits : (n, 2), rad or m; copies above them are excluded.
-    exclusion : (K, N) infinite if a row has fewer postures, else 0.
-    allowed : (N - 1, n) largest steps without an additional cost, rad or m.
-    """
-
-    copies: list[np.ndarray]
-    limits: np.ndarray
-    exclusion: np.ndarray
-    allowed: np.ndarray
-
-    @property
-    def turns(self) -> list[int]:
-        """Number of copies of each joint."""
-        return [copies.shape[-1] for copies in self.copies]
-
-    def broadcast(self, values: np.ndarray, joint: int) -> np.ndarray:
-        """Reshape values (..., turns) of a joint for arrays (..., turns of all
-        joints)."""
-        shape = [1] * len(self.copies)
-        shape[joint] = self.turns[joint]
-        return values.reshape(*values.shape[:-1], *shape)
-
-    def split_rows(self) -> list[slice]:
-        """Split all rows but the first one into blocks."""
-        rows = self.exclusion.shape[1]
-        starts = range(1, rows, _BLOCK)
-        return [slice(start, min(start + _BLOCK, rows)) for start in starts]
-
-    def motion_costs(self, rows: slice) -> list[np.ndarray]:
-        """Costs of the steps of each joint to B rows, (B, K, K, turns, turns): postures
-        of the row before and of this row, and the turns of both."""
-        before = slice(rows.start - 1, rows.stop - 1)
-        costs = []
-        for joint, copies in enumerate(self.copies):
-            start = copies[:, before].transpose(1, 0, 2)[:, :, None, :, None]
-            end = copies[:, rows].transpose(1, 0, 2)[:, None, :, None, :]
-            step = np.abs(start - end)
-            allowed = self.allowed[before, joint].reshape(-1, 1, 1, 1, 1)
-            excess = np.maximum(step - allowed, 0.0)
-            costs.append(step + _EXCESS_WEIGHT * excess)
-        return costs
-
-    def posture_costs(self, rows: slice) -> np.ndarray:
-        """Costs of the postures of B rows, (B, K, turns of all joints)."""
-        exclusion = self.exclusion[:, rows].T
-        costs = exclusion.reshape(*exclusion.shape, *[1] * len(self.copies))
-        for joint, (low, high) in enumerate(self.limits):
-            angles = self.copies[joint][:, rows].transpose(1, 0, 2)
-            distance = _MIDDLE_WEIGHT * np.abs(angles - 0.5 * (low + high))
-            joint_costs = np.where(angles > high + _ROUNDING, np.inf, distance)
-            costs = costs + self.broadcast(joint_costs, joint)
-        return costs
-
-
-def _find_least_motion(candidates: _PathCandidates) -> np.ndarray:
-    """Find the path with the least cost: first the excess of steps above the allowed
-    ones, then the sum of all steps.
-
-    The cost is a sum over joints, so the best turns of each joint are found separately:
-    with two turns each, the 2^n copies of a posture take 2 n operations.
-
-    Returns
-    -------
-    (N, n) angles of the chain, rad.
-    """
-    totals = _accumulate_costs(candidates)
-    # The posture of each row, and the turn of each joint.
-    states = np.empty((len(totals), 1 + len(candidates.copies)), int)
-    states[-1] = np.unravel_index(np.argmin(totals[-1]), totals[-1].shape)
-    for rows in reversed(candidates.split_rows()):
-        motion = candidates.motion_costs(rows)
-        for row in range(rows.stop - 1, rows.start - 1, -1):
-            posture, *turns = states[row]
-            total = totals[row - 1]
-            for joint, turn in enumerate(turns):
-                cost = motion[joint][row - rows.start, :, posture, :, turn]
-                total = total + candidates.broadcast(cost, joint)
-            states[row - 1] = np.unravel_index(np.argmin(total), total.shape)
-    posture, *turns = states.T
-    rows = np.arange(len(states))
-    angles = [
-        copies[posture, rows, turn]
-        for copies, turn in zip(candidates.copies, turns, strict=True)
-    ]
-    return np.stack(angles, axis=1)
-
-
-def _accumulate_costs(candidates: _PathCandidates) -> list[np.ndarray]:
-    """Accumulate the least cost of a path from the first row to each posture of each
-    row, (K, turns of all joints)."""
-    joints = len(candidates.copies)
-    totals = [candidates.posture_costs(slice(0, 1))[0]]
-    for rows in candidates.split_rows():
-        posture_costs = candidates.posture_costs(rows)
-        # Axes: rows, K of the row before, K, turns of all joints. The first of the turns
-        # belongs to the row before; minimising over it appends that of this row, so
-        # after all joints the turns are those of this row.
-        motion_costs = [
-            np.expand_dims(costs, tuple(range(4, joints + 3)))
-            for costs in candidates.motion_costs(rows)
-        ]
-        for row, posture_cost in enumerate(posture_costs):
-            cost = totals[-1][:, None]
-            for motion_cost in motion_costs:
-                cost = (cost[..., None] + motion_cost[row]).min(axis=2)
-            totals.append(cost.min(axis=0) + posture_cost)
-    return totals

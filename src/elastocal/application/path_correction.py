@@ -196,7 +196,7 @@ def correct_path(
         *compute_uncorrected_errors(
             calibrated, wanted.position, wanted.rotation, correction.error_before
         ),
-        predict_errors(calibrated, commands, wrench, draws=0),
+        predict_errors(calibrated, commands, wrench),
         outside | overloaded,
         status,
         large_steps,
@@ -299,11 +299,13 @@ def describe_path_accuracy(path: CorrectedPath) -> list[str]:
     has_bound = path.has_bound
     if not has_bound.any():
         return []
-    prediction = predict_errors(
-        path.calibrated,
-        path.correction.joint_angles[has_bound],
-        path.wrench[has_bound],
-    )
+    prediction = path.prediction
+    if not has_bound.all():
+        prediction = predict_errors(
+            path.calibrated,
+            path.correction.joint_angles[has_bound],
+            path.wrench[has_bound],
+        )
     region = "the targets" if has_bound.all() else "the targets with a bound"
     rms = format_millimetres(root_mean_square(path.uncorrected_error_m[has_bound]))
     turn_before = _format_milliradians(path.uncorrected_turn_rad[has_bound])
