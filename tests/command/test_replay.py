@@ -15,6 +15,8 @@ AROUND = [35, 18, 18, 40, 30, 60]
 CORNERS = 8
 
 
+# Force of a process on the flange, N, base axes: sideways, as no weight pulls.
+PROCESS_N = (0.0, 50.0, 0.0)
 # A caliper's error of a reflector, which no measurement of that reflector shows. A robot
 # that is corrected by such measurements errs by no more.
 CALIPER_M = 0.3e-3
@@ -104,6 +106,27 @@ def test_a_light_robot_is_corrected_and_a_second_round_does_no_harm(start):
     _, second, certificate, verification = correct(replay, options, base_known=True)
     assert second < 1.1 * first
     assert_not_contradicted(second, certificate, verification)
+
+
+@pytest.mark.slow
+def test_a_second_round_removes_what_the_first_could_not_see(start):
+    """No pose of the first campaign has a load, and no weight turns joint 1. Along the
+    path a force of a process does."""
+    offsets = {"SMR1": (0.04, 0.02, 0.06)}
+    replay = start(LIGHT, offsets, "--poses", "25", "--base-known", comma=False)
+    replay.write_path(draw_way(LIGHT_MIDDLE), 60, "xyz", "WPR", force_N=PROCESS_N)
+    units = ("--lengths", "mm", "--angles", "deg", "--rotation", "euler:xyz")
+    options = (*units, "--format", "urscript")
+    before, first, _, verification = correct(replay, options, base_known=True)
+    remaining_m = verification["remaining"]["rms_m"]
+    assert first < before
+    assert verification["remaining"]["remains"]
+    assert "compliance: identify" in replay.follow()
+    _, second, certificate, verification = correct(replay, options, base_known=True)
+    assert second < 0.5 * first
+    assert verification["remaining"]["rms_m"] < 0.3 * remaining_m
+    assert second < certificate["accuracy"]["rms_bound_m"]
+    assert verification["prediction"]["held"]
 
 
 @pytest.mark.slow
