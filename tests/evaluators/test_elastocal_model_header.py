@@ -66,7 +66,7 @@ def test_poses_are_those_of_the_package(program, name, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "regression", ["ridge_harmonics", "two_joints", "gaussian_process"]
+    "regression", ["ridge_harmonics", "two_joints", "gaussian_process", "extra_trees"]
 )
 def test_regressions_are_those_of_the_package(program, regression, tmp_path):
     calibrated = make_calibrated("kuka", regression)
@@ -125,7 +125,9 @@ def test_a_target_takes_less_than_twenty_microseconds(program, tmp_path):
     [
         ({"version": 2}, "no elastocal model of version 1"),
         ({"format": "verdict"}, "no elastocal model of version 1"),
-        ({"regression": {"name": "extra_trees", "law": None}}, "extra_trees has no"),
+        ({"regression": {"name": "splines", "law": None}}, "splines has no"),
+        ({"springs": [{"coordinate": 99, "value": 1.0}]}, "no index"),
+        ({"springs": [{"coordinate": 0, "value": 1.0, "loads": [-1]}]}, "no index"),
     ],
 )
 def test_another_file_is_refused(program, tmp_path, change, message):

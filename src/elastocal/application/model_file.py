@@ -49,7 +49,7 @@ from elastocal.io.typed_json import (
 from elastocal.mechanics.chain import AXES
 from elastocal.mechanics.robot_file import describe_robot, parse_robot
 from elastocal.mechanics.sites import build_sites
-from elastocal.residual_model.laws import DisplacementLaw, ProcessLaw
+from elastocal.residual_model.laws import DisplacementLaw, ProcessLaw, TreesLaw
 from elastocal.residual_model.selection import (
     compute_effect_factors,
     compute_regression_range,
@@ -69,7 +69,6 @@ if TYPE_CHECKING:
 
     Numbers = tuple[float, ...]
     Rows = tuple[Numbers, ...]
-    Vector = tuple[float, float, float]
 
 FORMAT = "elastocal model"
 # Version of the format: a program refuses files of a later one.
@@ -243,6 +242,36 @@ class GaussianProcess:
 
 
 @dataclass(frozen=True)
+class RegressionTree:
+    """A regression tree, see `residual_model.laws.Tree`.
+
+    Attributes
+    ----------
+    column, threshold, children, value : as in `Tree`; columns as in `GaussianProcess`.
+    """
+
+    column: tuple[int, ...]
+    threshold: tuple[float, ...]
+    children: tuple[tuple[int, ...], ...]
+    value: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
+class Forest:
+    """The mean of regression trees.
+
+    Attributes
+    ----------
+    target_offset_m : tuple of float
+        As in `GaussianProcess`.
+    trees : tuple of RegressionTree
+    """
+
+    target_offset_m: tuple[float, ...]
+    trees: tuple[RegressionTree, ...]
+
+
+@dataclass(frozen=True)
 class RegressionFormula:
     """A regression on the residuals, which displaces the end effector, m, base axes.
 
@@ -251,13 +280,13 @@ class RegressionFormula:
     name : str
     range : FittedRange
         Beyond which nothing is added.
-    law : DisplacementSeries or GaussianProcess, optional
+    law : DisplacementSeries, GaussianProcess or Forest, optional
         Its formula; None if it has none, so that only elastocal evaluates it.
     """
 
     name: str
     range: FittedRange
-    law: DisplacementSeries | GaussianProcess | None
+    law: DisplacementSeries | GaussianProcess | Forest | None
 
 
 @dataclass(frozen=True)
@@ -552,26 +581,45 @@ def _describe_regression(
     residual_model = calibrated.residual_model
     if residual_model is None or residual_model.choice is None:
         return None
-    law = residual_model.predictor.law
-    formula: DisplacementSeries | GaussianProcess | None = None
+    express = residual_model.predictor.law
+    law = None if express is None else express()
+    formula: DisplacementSeries | GaussianProcess | Forest | None = None
     if isinstance(law, DisplacementLaw):
         formula = _describe_displacements(calibrated, law, compliance)
     elif isinstance(law, ProcessLaw):
-        formula = GaussianProcess(
-            tuple(law.columns.tolist()),
-            _as_numbers(residual_model.target_offset_m),
-            _as_numbers(law.center),
-            _as_numbers(law.spread),
-            _as_numbers(law.lengths),
-            _as_rows(law.points),
-            _as_rows(law.weights),
-            _as_numbers(law.offset),
-            _as_numbers(law.size),
-        )
+        formula = _describe_process(residual_model, law)
+    elif isinstance(law, TreesLaw):
+        formula = _describe_trees(residual_model, law)
     states = calibrated.states
     name = residual_model.choice.regression
     span = _make_range(*compute_regression_range(states), *compute_load_limits(states))
     return RegressionFormula(name, span, formula)
+
+
+def _describe_process(
+    residual_model: ResidualModel, law: ProcessLaw
+) -> GaussianProcess:
+    return GaussianProcess(
+        tuple(law.columns.tolist()),
+        _as_numbers(residual_model.target_offset_m),
+        _as_numbers(law.center),
+        _as_numbers(law.spread),
+        _as_numbers(law.lengths),
+        _as_rows(law.points),
+        _as_rows(law.weights),
+        _as_numbers(law.offset),
+        _as_numbers(law.size),
+    )
+
+
+def _describe_trees(residual_model: ResidualModel, law: TreesLaw) -> Forest:
+    trees = []
+    for tree in law.trees:
+        column = tuple(tree.column.tolist())
+        threshold = _as_numbers(tree.threshold)
+        children = tuple(map(tuple, tree.children.tolist()))
+        trees.append(RegressionTree(column, threshold, children, _as_rows(tree.value)))
+    return Forest(_as_numbers(residual_model.target_offset_m), tuple(trees))
 
 
 def _describe_displacements(

@@ -82,6 +82,12 @@ struct Json {
     throw std::runtime_error("model file: no key " + key);
   }
   int integer(const std::string& key) const { return static_cast<int>(at(key).number); }
+  // The value as an index below a size.
+  int index(std::size_t size, std::size_t first = 0) const {
+    if (kind != Kind::number || number < static_cast<double>(first) || number >= static_cast<double>(size))
+      throw std::runtime_error("model file: no index where one is needed");
+    return static_cast<int>(number);
+  }
   std::vector<double> numbers() const {
     std::vector<double> values;
     values.reserve(items.size());
@@ -363,6 +369,43 @@ struct Range {
   }
 };
 
+// An input of a regression: a joint angle, a component of the wrench, or of the position of
+// the target.
+inline double get_input(int column, const std::vector<double>& angles, const Wrench& wrench,
+                        const Vector3& target_offset) {
+  const auto number = static_cast<std::size_t>(column);
+  if (number < angles.size()) return angles[number];
+  if (number < angles.size() + 6) return wrench[number - angles.size()];
+  return target_offset[number - angles.size() - 6];
+}
+
+// The mean of regression trees, which were grown on inputs in single precision.
+struct Forest {
+  struct Node {
+    int column = -1;
+    double threshold = 0.0;
+    std::array<int, 2> children{};
+    Vector3 value{};
+  };
+  Vector3 target_offset{};
+  std::vector<std::vector<Node>> trees;
+
+  Vector3 mean(const std::vector<double>& angles, const Wrench& wrench) const {
+    Vector3 sum{};
+    for (const std::vector<Node>& tree : trees) {
+      const Node* node = tree.data();
+      while (node->column >= 0) {
+        const double input = get_input(node->column, angles, wrench, target_offset);
+        const bool is_beyond = static_cast<double>(static_cast<float>(input)) > node->threshold;
+        node = tree.data() + node->children[is_beyond ? 1 : 0];
+      }
+      for (std::size_t i = 0; i < 3; ++i) sum[i] += node->value[i];
+    }
+    for (double& component : sum) component /= static_cast<double>(trees.size());
+    return sum;
+  }
+};
+
 // The mean of a Gaussian process with a Matern kernel of order 5/2.
 struct Process {
   std::vector<int> columns;
@@ -372,14 +415,9 @@ struct Process {
 
   Vector3 mean(const std::vector<double>& angles, const Wrench& wrench,
                std::vector<double>& scaled) const {
-    const std::size_t joints = angles.size();
     const std::size_t width = columns.size();
     for (std::size_t i = 0; i < width; ++i) {
-      const auto column = static_cast<std::size_t>(columns[i]);
-      double input = 0.0;
-      if (column < joints) input = angles[column];
-      else if (column < joints + 6) input = wrench[column - joints];
-      else input = target_offset[column - joints - 6];
+      const double input = get_input(columns[i], angles, wrench, target_offset);
       scaled[i] = (input - center[i]) / scale[i];
     }
     Vector3 sum{};
@@ -559,6 +597,7 @@ class Model {
   detail::Range range_;
   std::vector<detail::Range> regression_range_;
   std::vector<detail::Process> process_;
+  std::vector<detail::Forest> forest_;
 
   Model(const detail::Json& json, bool regression)
       : range_((check(json), json.at("range"))) {
@@ -610,16 +649,16 @@ class Model {
       transform.sine = std::sin(transform.constant);
       const detail::Json* coordinate = stated.find("coordinate");
       if (coordinate && coordinate->kind == detail::Json::Kind::number) {
-        transform.coordinate = static_cast<int>(coordinate->number);
+        transform.coordinate = coordinate->index(coordinates_);
         index_[static_cast<std::size_t>(transform.coordinate)] = static_cast<int>(transforms_.size());
       }
       transforms_.push_back(transform);
     }
   }
 
-  static detail::Body read_body(const detail::Json& stated, const char* mass, const char* moment) {
+  detail::Body read_body(const detail::Json& stated, const char* mass, const char* moment) const {
     detail::Body body;
-    body.after = stated.integer("after");
+    body.after = stated.at("after").index(transforms_.size() + 1);
     body.mass = stated.at(mass).number;
     body.moment = stated.at(moment).vector();
     if (const detail::Json* loads = stated.find("loads_joints"))
@@ -630,21 +669,22 @@ class Model {
   void read_terms(const detail::Json& list, detail::Terms& terms) {
     for (const detail::Json& stated : list.items) {
       detail::Term term;
-      term.coordinate = stated.integer("coordinate");
+      term.coordinate = stated.at("coordinate").index(coordinates_);
       term.value = stated.at("value").number;
       if (const detail::Json* wave = stated.find("wave")) term.sine = wave->text == "sin";
       if (const detail::Json* orders = stated.find("orders")) term.phase = find_phase(*orders);
       if (const detail::Json* angles = stated.find("angles"))
-        for (double joint : angles->numbers()) term.angles.push_back(static_cast<int>(joint));
+        for (const detail::Json& joint : angles->items) term.angles.push_back(joint.index(joints_));
       if (const detail::Json* loads = stated.find("loads"))
-        for (double coordinate : loads->numbers()) term.loads.push_back(static_cast<int>(coordinate));
+        for (const detail::Json& coordinate : loads->items)
+          term.loads.push_back(coordinate.index(coordinates_));
       if (const detail::Json* limited = stated.find("limited")) {
         term.limit = limited->at("kind").text == "tanh" ? detail::Limit::tanh : detail::Limit::clip;
-        term.limited = limited->integer("coordinate");
+        term.limited = limited->at("coordinate").index(coordinates_);
         term.threshold = limited->at("limit").number;
       }
       if (const detail::Json* weight = stated.find("weight")) {
-        term.weighed_joint = weight->integer("joint");
+        term.weighed_joint = weight->at("joint").index(joints_);
         term.body = read_body(*weight, "mass", "moment");
       }
       terms.add(term);
@@ -655,7 +695,7 @@ class Model {
   int find_phase(const detail::Json& orders) {
     detail::Phase phase;
     for (const detail::Json& pair : orders.items)
-      phase.emplace_back(static_cast<int>(pair.items.at(0).number), pair.items.at(1).number);
+      phase.emplace_back(pair.items.at(0).index(joints_), pair.items.at(1).number);
     const auto known = std::find(phases_.begin(), phases_.end(), phase);
     const int number = static_cast<int>(known - phases_.begin());
     if (known != phases_.end()) return number;
@@ -677,8 +717,15 @@ class Model {
       read_terms(*series, series_);
       return;
     }
+    if (const detail::Json* trees = law.find("trees")) {
+      forest_.emplace_back();
+      forest_.back().target_offset = law.at("target_offset_m").vector();
+      for (const detail::Json& tree : trees->items) forest_.back().trees.push_back(read_tree(tree));
+      return;
+    }
     detail::Process process;
-    for (double column : law.at("columns").numbers()) process.columns.push_back(static_cast<int>(column));
+    for (const detail::Json& column : law.at("columns").items)
+      process.columns.push_back(column.index(joints_ + 9));
     process.target_offset = law.at("target_offset_m").vector();
     process.center = law.at("center").numbers();
     process.scale = law.at("spread").numbers();
@@ -692,6 +739,22 @@ class Model {
     process.offset = law.at("offset").vector();
     process.size = law.at("size").vector();
     process_.push_back(process);
+  }
+
+  std::vector<detail::Forest::Node> read_tree(const detail::Json& tree) const {
+    std::vector<detail::Forest::Node> nodes(tree.at("column").items.size());
+    for (std::size_t number = 0; number < nodes.size(); ++number) {
+      detail::Forest::Node& node = nodes[number];
+      const detail::Json& column = tree.at("column").items[number];
+      node.column = column.number < 0.0 ? -1 : column.index(joints_ + 9);
+      node.threshold = tree.at("threshold").items.at(number).number;
+      const detail::Json& children = tree.at("children").items.at(number);
+      // Children come after their parent, so that every path ends.
+      for (std::size_t side = 0; node.column >= 0 && side < 2; ++side)
+        node.children[side] = children.items.at(side).index(nodes.size(), number + 1);
+      node.value = tree.at("value").items.at(number).vector();
+    }
+    return nodes;
   }
 
   // Decide which coordinates move, and of which the twists, loads and frames are needed.
@@ -976,6 +1039,7 @@ class Model {
     Vector3 moved{};
     if (regression_range_.empty() || !regression_range_.front().contains(workspace.angles, wrench))
       return moved;
+    if (!forest_.empty()) return forest_.front().mean(workspace.angles, wrench);
     if (!process_.empty()) return process_.front().mean(workspace.angles, wrench, workspace.scaled);
     std::fill(workspace.displacement.begin(), workspace.displacement.end(), 0.0);
     for (std::size_t number : series_.fixed)

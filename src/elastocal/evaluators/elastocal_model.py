@@ -205,6 +205,8 @@ class Model:
             jacobian = self._compute_jacobian(self._walk(self._place(angles)))[:, :3]
             moved = self._displace(law["displacements"], angles, loads)
             mean = (jacobian @ moved[..., None])[..., 0]
+        elif "trees" in law:
+            mean = _evaluate_trees(law, angles, wrench)
         else:
             mean = _evaluate_process(law, angles, wrench)
         within = _is_within(self._regression["range"], angles, wrench)
@@ -324,11 +326,38 @@ def _is_within(
     return np.asarray(~(beyond.any(axis=1) | overloaded))
 
 
+def _collect_inputs(
+    law: dict[str, Any], angles: np.ndarray, wrench: np.ndarray
+) -> np.ndarray:
+    """Inputs of a regression on joint angles, wrench and position of the target."""
+    offset = np.broadcast_to(law["target_offset_m"], (len(angles), 3))
+    return np.hstack([angles, wrench, offset])
+
+
+def _evaluate_trees(
+    law: dict[str, Any], angles: np.ndarray, wrench: np.ndarray
+) -> np.ndarray:
+    # Trees are grown on inputs in single precision.
+    inputs = _collect_inputs(law, angles, wrench).astype(np.float32)
+    rows = np.arange(len(inputs))
+    total = np.zeros((len(inputs), 3))
+    for tree in law["trees"]:
+        column = np.array(tree["column"])
+        threshold = np.array(tree["threshold"])
+        children = np.array(tree["children"])
+        node = np.zeros(len(inputs), int)
+        while (column[node] >= 0).any():
+            goes_right = inputs[rows, column[node]] > threshold[node]
+            is_leaf = column[node] < 0
+            node = np.where(is_leaf, node, children[node, goes_right.astype(int)])
+        total += np.array(tree["value"])[node]
+    return total / len(law["trees"])
+
+
 def _evaluate_process(
     law: dict[str, Any], angles: np.ndarray, wrench: np.ndarray
 ) -> np.ndarray:
-    offset = np.broadcast_to(law["target_offset_m"], (len(angles), 3))
-    inputs = np.hstack([angles, wrench, offset])[:, law["columns"]]
+    inputs = _collect_inputs(law, angles, wrench)[:, law["columns"]]
     scaled = (inputs - law["center"]) / law["spread"] / law["lengths"]
     points = np.array(law["points"])
     square = (scaled**2).sum(axis=1)[:, None] + (points**2).sum(axis=1)

@@ -61,3 +61,44 @@ class ProcessLaw:
     def scaled(self, factor: float) -> ProcessLaw:
         """Scale the mean."""
         return replace(self, offset=factor * self.offset, size=factor * self.size)
+
+
+@dataclass(frozen=True)
+class Tree:
+    """A regression tree of K nodes, the first of which is the root.
+
+    Attributes
+    ----------
+    column : (K,) int array
+        Input that decides at a node; negative at a leaf.
+    threshold : (K,) array
+        An input in single precision that is at most this goes to the first child.
+    children : (K, 2) int array
+    value : (K, 3) array
+        Predicted at a leaf, m.
+    """
+
+    column: np.ndarray
+    threshold: np.ndarray
+    children: np.ndarray
+    value: np.ndarray
+
+
+@dataclass(frozen=True)
+class TreesLaw:
+    """The mean of regression trees.
+
+    Attributes
+    ----------
+    trees : tuple of Tree
+    """
+
+    trees: tuple[Tree, ...]
+
+    def scaled(self, factor: float) -> TreesLaw:
+        """Scale the mean."""
+        trees = [replace(tree, value=factor * tree.value) for tree in self.trees]
+        return TreesLaw(tuple(trees))
+
+
+Law = DisplacementLaw | ProcessLaw | TreesLaw

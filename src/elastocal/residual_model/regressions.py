@@ -9,7 +9,7 @@ predictor for each setting.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
@@ -20,10 +20,12 @@ from elastocal.effects.formulas import Term, list_terms, make_symbolic_angles
 from elastocal.fitting.normal_equations import invert_cholesky_factor
 from elastocal.io import plugins
 from elastocal.io.plugins import load_plugins
-from elastocal.residual_model.laws import DisplacementLaw, ProcessLaw
+from elastocal.residual_model.laws import DisplacementLaw, ProcessLaw, Tree, TreesLaw
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from elastocal.residual_model.laws import Law
 
     Setting = Mapping[str, Any]
 
@@ -108,15 +110,16 @@ class Predictor:
     std : function
         Returns the standard deviation of a new measurement about them, (M, 3) array, m;
         not a number if the regression states none.
-    law : DisplacementLaw or ProcessLaw, optional
-        Formula of the mean; None if it has none that other programs can evaluate.
+    law : function, optional
+        Returns the formula of the mean, see `laws`; None if it has none that other
+        programs can evaluate. Cross-validation fits hundreds and asks for none.
     """
 
     mean: Callable[[Inputs], np.ndarray]
     std: Callable[[Inputs], np.ndarray] = lambda inputs: np.full(
         (len(inputs), 3), np.nan
     )
-    law: DisplacementLaw | ProcessLaw | None = None
+    law: Callable[[], Law] | None = None
 
 
 @dataclass(frozen=True)
@@ -333,7 +336,8 @@ def fit_ridge_harmonics(
                 for chunk in _split_into_chunks(queries)
             )
 
-        yield Predictor(mean, law=_express_harmonics(coefficients, orders, joints))
+        law = partial(_express_harmonics, coefficients, orders, joints)
+        yield Predictor(mean, law=law)
 
 
 def _express_harmonics(
@@ -394,7 +398,8 @@ def fit_two_joints(
         geometric, by_pair = np.split(coefficients, [jacobian.shape[1]])
         return queries.jacobian @ geometric + columns @ by_pair
 
-    yield Predictor(mean, law=_express_pair(coefficients, best_pair, len(joints)))
+    law = partial(_express_pair, coefficients, best_pair, len(joints))
+    yield Predictor(mean, law=law)
 
 
 def _express_pair(
@@ -443,7 +448,16 @@ def fit_extra_trees(
         predictions = [tree.predict(rows, check_input=False) for tree in trees]
         return np.mean(predictions, axis=0)
 
-    yield Predictor(mean)
+    def law() -> TreesLaw:
+        grown = []
+        for tree in trees:
+            nodes = tree.tree_
+            children = np.stack([nodes.children_left, nodes.children_right], axis=1)
+            value = nodes.value[:, :, 0]
+            grown.append(Tree(nodes.feature, nodes.threshold, children, value))
+        return TreesLaw(tuple(grown))
+
+    yield Predictor(mean, law=law)
 
 
 def count_rows_of_a_tree(joints: int) -> int:
@@ -547,7 +561,8 @@ def fit_gaussian_process(
             process.mean(scaling.scale(queries)) * scaling.size + scaling.offset
         ),
         lambda queries: process.std(scaling.scale(queries))[:, None] * scaling.size,
-        ProcessLaw(
+        partial(
+            ProcessLaw,
             scaling.varying,
             scaling.center,
             scaling.spread,

@@ -285,8 +285,10 @@ def fit_choice(
         stated = std_factor * predictor.std(queries)
         return np.where(np.isfinite(stated), stated, spread.otherwise_m)
 
-    law = predictor.law.scaled(shrinkage) if predictor.law else None
-    return Predictor(mean, std, law)
+    express = predictor.law
+    if express is None:
+        return Predictor(mean, std)
+    return Predictor(mean, std, lambda: express().scaled(shrinkage))
 
 
 def _fit_setting(
