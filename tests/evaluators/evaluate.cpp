@@ -2,12 +2,12 @@
 //
 // evaluate MODEL REGRESSION predict|rigid|correct|extrapolated|time < rows > rows, doubles.
 
-#include "elastocal_model.hpp"
-
 #include <cstdio>
 #include <cstring>
 #include <ctime>
 #include <iostream>
+
+#include "elastocal_model.hpp"
 
 namespace {
 
@@ -62,7 +62,8 @@ int main(int, char** arguments) {
     // Command or start, wrench, and the wanted pose of a correction.
     const std::size_t width = joints + 6 + (corrects ? 12 : 0);
     std::vector<Row> rows;
-    for (auto row = read_row(width); !row.empty(); row = read_row(width)) rows.emplace_back(row, joints);
+    for (auto row = read_row(width); !row.empty(); row = read_row(width))
+      rows.emplace_back(row, joints);
     if (what == "time") {
       std::cout << find_shortest_us(model, rows, workspace) << "\n";
       return 0;

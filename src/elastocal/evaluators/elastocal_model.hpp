@@ -84,7 +84,8 @@ struct Json {
   int integer(const std::string& key) const { return static_cast<int>(at(key).number); }
   // The value as an index below a size.
   int index(std::size_t size, std::size_t first = 0) const {
-    if (kind != Kind::number || number < static_cast<double>(first) || number >= static_cast<double>(size))
+    if (kind != Kind::number || number < static_cast<double>(first) ||
+        number >= static_cast<double>(size))
       throw std::runtime_error("model file: no index where one is needed");
     return static_cast<int>(number);
   }
@@ -200,7 +201,8 @@ class JsonReader {
       return;
     }
     const std::size_t start = at_;
-    while (at_ < text_.size() && std::string("+-.eE0123456789").find(text_[at_]) != std::string::npos)
+    while (at_ < text_.size() &&
+           std::string("+-.eE0123456789").find(text_[at_]) != std::string::npos)
       ++at_;
     value.kind = Json::Kind::number;
     if (at_ == start || !parse(start, value.number)) fail();
@@ -240,9 +242,14 @@ struct Frame {
   }
   void turn(int axis, double cosine, double sine) {
     switch (axis) {
-      case 0: turn(axes[1], axes[2], cosine, sine); break;
-      case 1: turn(axes[2], axes[0], cosine, sine); break;
-      default: turn(axes[0], axes[1], cosine, sine);
+      case 0:
+        turn(axes[1], axes[2], cosine, sine);
+        break;
+      case 1:
+        turn(axes[2], axes[0], cosine, sine);
+        break;
+      default:
+        turn(axes[0], axes[1], cosine, sine);
     }
   }
   static void turn(Vector3& second, Vector3& third, double cosine, double sine) {
@@ -312,12 +319,12 @@ struct Term {
 
   // Add a term with the same factors but value and weight; false if it has others.
   bool merge(const Term& other) {
-    const bool is_alike = coordinate == other.coordinate && phase == other.phase &&
-                          sine == other.sine && angles == other.angles && loads == other.loads &&
-                          limit == other.limit && weighed_joint == other.weighed_joint &&
-                          (limit == Limit::none ||
-                           (limited == other.limited && threshold == other.threshold)) &&
-                          (weighed_joint < 0 || body.after == other.body.after);
+    const bool is_alike =
+        coordinate == other.coordinate && phase == other.phase && sine == other.sine &&
+        angles == other.angles && loads == other.loads && limit == other.limit &&
+        weighed_joint == other.weighed_joint &&
+        (limit == Limit::none || (limited == other.limited && threshold == other.threshold)) &&
+        (weighed_joint < 0 || body.after == other.body.after);
     if (!is_alike) return false;
     if (weighed_joint < 0) {
       value += other.value;
@@ -599,8 +606,7 @@ class Model {
   std::vector<detail::Process> process_;
   std::vector<detail::Forest> forest_;
 
-  Model(const detail::Json& json, bool regression)
-      : range_((check(json), json.at("range"))) {
+  Model(const detail::Json& json, bool regression) : range_((check(json), json.at("range"))) {
     const detail::Json& kinematics = json.at("kinematics");
     joints_ = static_cast<std::size_t>(kinematics.integer("joints"));
     coordinates_ = static_cast<std::size_t>(kinematics.integer("coordinates"));
@@ -633,7 +639,8 @@ class Model {
   void read_joint_names(const detail::Json& robot) {
     const detail::Json* names = robot.find("joint_names");
     for (std::size_t joint = 0; joint < joints_; ++joint)
-      joint_names_.push_back(names ? names->items.at(joint).text : "joint" + std::to_string(joint + 1));
+      joint_names_.push_back(names ? names->items.at(joint).text
+                                   : "joint" + std::to_string(joint + 1));
   }
 
   void read_transforms(const detail::Json& kinematics) {
@@ -650,7 +657,8 @@ class Model {
       const detail::Json* coordinate = stated.find("coordinate");
       if (coordinate && coordinate->kind == detail::Json::Kind::number) {
         transform.coordinate = coordinate->index(coordinates_);
-        index_[static_cast<std::size_t>(transform.coordinate)] = static_cast<int>(transforms_.size());
+        index_[static_cast<std::size_t>(transform.coordinate)] =
+            static_cast<int>(transforms_.size());
       }
       transforms_.push_back(transform);
     }
@@ -700,7 +708,8 @@ class Model {
     const int number = static_cast<int>(known - phases_.begin());
     if (known != phases_.end()) return number;
     const double order = phase.front().second;
-    const bool is_multiple = phase.size() == 1 && order == std::floor(order) && order <= most_multiples;
+    const bool is_multiple =
+        phase.size() == 1 && order == std::floor(order) && order <= most_multiples;
     orders_.push_back(is_multiple ? static_cast<int>(order) : 0);
     int& largest = largest_orders_.at(static_cast<std::size_t>(phase.front().first));
     largest = std::max(largest, orders_.back());
@@ -759,16 +768,20 @@ class Model {
 
   // Decide which coordinates move, and of which the twists, loads and frames are needed.
   void plan_walk() {
-    std::vector<char> moves(coordinates_, 0), needs_load(coordinates_, 0), needs_twist(coordinates_, 0);
+    std::vector<char> moves(coordinates_, 0), needs_load(coordinates_, 0),
+        needs_twist(coordinates_, 0);
     for (std::size_t joint = 0; joint < joints_; ++joint) moves[joint] = needs_twist[joint] = 1;
     framed_.assign(transforms_.size() + 1, 0);
     for (const detail::Body& body : bodies_) framed_.at(static_cast<std::size_t>(body.after)) = 1;
-    for (const detail::Term& term : terms_.all) moves.at(static_cast<std::size_t>(term.coordinate)) = 1;
-    for (const detail::Term& term : series_.all) needs_twist.at(static_cast<std::size_t>(term.coordinate)) = 1;
+    for (const detail::Term& term : terms_.all)
+      moves.at(static_cast<std::size_t>(term.coordinate)) = 1;
+    for (const detail::Term& term : series_.all)
+      needs_twist.at(static_cast<std::size_t>(term.coordinate)) = 1;
     for (const detail::Terms* terms : {&terms_, &series_})
       for (const detail::Term& term : terms->all) {
         for (int coordinate : term.loads) needs_load.at(static_cast<std::size_t>(coordinate)) = 1;
-        if (term.limit != detail::Limit::none) needs_load.at(static_cast<std::size_t>(term.limited)) = 1;
+        if (term.limit != detail::Limit::none)
+          needs_load.at(static_cast<std::size_t>(term.limited)) = 1;
         if (term.weighed_joint >= 0) framed_.at(static_cast<std::size_t>(term.body.after)) = 1;
       }
     for (const detail::Transform& transform : transforms_) {
@@ -783,9 +796,10 @@ class Model {
     std::sort(loaded_.begin(), loaded_.end(), [this](int first, int second) {
       return index_[static_cast<std::size_t>(first)] > index_[static_cast<std::size_t>(second)];
     });
-    std::sort(bodies_.begin(), bodies_.end(), [](const detail::Body& first, const detail::Body& second) {
-      return first.after > second.after;
-    });
+    std::sort(bodies_.begin(), bodies_.end(),
+              [](const detail::Body& first, const detail::Body& second) {
+                return first.after > second.after;
+              });
   }
 
   static std::vector<double> invert(std::vector<double> matrix, std::size_t size) {
@@ -794,7 +808,8 @@ class Model {
     for (std::size_t column = 0; column < size; ++column) {
       std::size_t pivot = column;
       for (std::size_t row = column; row < size; ++row)
-        if (std::abs(matrix[row * size + column]) > std::abs(matrix[pivot * size + column])) pivot = row;
+        if (std::abs(matrix[row * size + column]) > std::abs(matrix[pivot * size + column]))
+          pivot = row;
       for (std::size_t k = 0; k < size; ++k) {
         std::swap(matrix[pivot * size + k], matrix[column * size + k]);
         std::swap(inverse[pivot * size + k], inverse[column * size + k]);
@@ -912,8 +927,10 @@ class Model {
         amount = transform.sign * (rigid ? workspace.angles[k] : workspace.coordinates[k]);
         if (transform.turns) detail::cosine_and_sine(amount, cosine, sine);
       }
-      if (transform.turns) frame.turn(transform.axis, cosine, sine);
-      else frame.shift(transform.axis, amount);
+      if (transform.turns)
+        frame.turn(transform.axis, cosine, sine);
+      else
+        frame.shift(transform.axis, amount);
     }
     if (framed_.back()) workspace.frames.back() = frame;
     workspace.end = frame;
@@ -984,8 +1001,12 @@ class Model {
   void evaluate_loads(const Wrench& wrench, Workspace& workspace) const {
     const Vector3 force{wrench[0], wrench[1], wrench[2]};
     const Vector3 moment = detail::cross(workspace.end.origin, force);
-    Wrench on_joints{wrench[0], wrench[1], wrench[2],
-                     wrench[3] + moment[0], wrench[4] + moment[1], wrench[5] + moment[2]};
+    Wrench on_joints{wrench[0],
+                     wrench[1],
+                     wrench[2],
+                     wrench[3] + moment[0],
+                     wrench[4] + moment[1],
+                     wrench[5] + moment[2]};
     Wrench on_links{};
     auto body = bodies_.begin();
     for (int coordinate : loaded_) {
@@ -1013,11 +1034,14 @@ class Model {
     for (std::size_t number : terms.others) {
       const detail::Term& term = terms.all[number];
       double amount = factors[number];
-      for (int coordinate : term.loads) amount *= workspace.loads[static_cast<std::size_t>(coordinate)];
+      for (int coordinate : term.loads)
+        amount *= workspace.loads[static_cast<std::size_t>(coordinate)];
       if (term.limit != detail::Limit::none) {
         const double load = workspace.loads[static_cast<std::size_t>(term.limited)];
-        if (term.limit == detail::Limit::tanh) amount *= std::tanh(load / term.threshold);
-        else amount *= std::min(std::max(load, -term.threshold), term.threshold);
+        if (term.limit == detail::Limit::tanh)
+          amount *= std::tanh(load / term.threshold);
+        else
+          amount *= std::min(std::max(load, -term.threshold), term.threshold);
       }
       if (term.weighed_joint >= 0) amount *= weigh(term.body, term.weighed_joint, workspace);
       displaced[static_cast<std::size_t>(term.coordinate)] += amount;
@@ -1055,7 +1079,8 @@ class Model {
       const auto k = static_cast<std::size_t>(transforms_[number].coordinate);
       const detail::Twist& twist = workspace.twists[k];
       const Vector3 lever = detail::cross(twist.angular, point);
-      for (int i = 0; i < 3; ++i) moved[i] += workspace.displacement[k] * (twist.linear[i] + lever[i]);
+      for (int i = 0; i < 3; ++i)
+        moved[i] += workspace.displacement[k] * (twist.linear[i] + lever[i]);
     }
     return moved;
   }

@@ -2,15 +2,14 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <geometry_msgs/msg/wrench_stamped.hpp>
 #include <memory>
 #include <optional>
+#include <rclcpp/rclcpp.hpp>
 #include <stdexcept>
 #include <string>
-#include <vector>
-
-#include <geometry_msgs/msg/wrench_stamped.hpp>
-#include <rclcpp/rclcpp.hpp>
 #include <trajectory_msgs/msg/joint_trajectory.hpp>
+#include <vector>
 
 #include "elastocal_model.hpp"
 
@@ -23,7 +22,8 @@ class CorrectTrajectory : public rclcpp::Node {
       : Node("correct_trajectory"),
         model_(elastocal::Model::load(declare_parameter<std::string>("model"))),
         workspace_(model_),
-        joint_names_(declare_parameter<std::vector<std::string>>("joint_names", model_.joint_names())),
+        joint_names_(
+            declare_parameter<std::vector<std::string>>("joint_names", model_.joint_names())),
         allow_extrapolation_(declare_parameter<bool>("allow_extrapolation", false)) {
     if (joint_names_.size() != model_.joints())
       throw std::runtime_error("joint_names: a name for each joint of the model is needed");
@@ -74,7 +74,8 @@ class CorrectTrajectory : public rclcpp::Node {
   }
 
   // Column of each joint of the model in a trajectory.
-  std::optional<std::vector<std::size_t>> find_columns(const std::vector<std::string>& names) const {
+  std::optional<std::vector<std::size_t>> find_columns(
+      const std::vector<std::string>& names) const {
     std::vector<std::size_t> columns;
     for (const std::string& joint : joint_names_) {
       const auto found = std::find(names.begin(), names.end(), joint);
