@@ -29,6 +29,7 @@ def simulate_campaign(job: Job) -> None:
             for point in settings["points"]
         },
         "compliance": "identify",
+        "application_point_std_m": 0,
         "declared": [],
         "holdout": {"fraction": 0.3, "seed": 1},
     }

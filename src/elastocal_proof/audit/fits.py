@@ -2,7 +2,8 @@
 kinematics at the stated estimates, and residuals from MuJoCo's equilibrium.
 
 Models with effects other than joint springs and links of one section are left out, and
-so are campaigns with fitted frames or targets, declared effects or masses.
+so are campaigns with fitted frames or targets, declared effects or masses, and points of
+loads that are not exact.
 """
 
 from __future__ import annotations

@@ -59,6 +59,7 @@ def build_campaign_document(name: str, arm: Arm, design: Design) -> dict[str, An
         "frame": design.frame,
         "targets": targets,
         "compliance": "identify",
+        "application_point_std_m": 0,
         "declared": list(design.declared),
         "holdout": {"poses": list(range(design.poses - design.held_out, design.poses))},
         "remainder": "none",
