@@ -138,6 +138,42 @@ def test_another_file_is_refused_in_a_line(written, tmp_path, change, message):
     assert "\n" not in str(refusal.value)
 
 
+def list_places(value, place=()):
+    """Places of all values in a document."""
+    yield place
+    entries = ()
+    if isinstance(value, dict):
+        entries = value.items()
+    elif isinstance(value, list):
+        entries = enumerate(value[:2])
+    for key, entry in entries:
+        yield from list_places(entry, (*place, key))
+
+
+@pytest.mark.slow
+def test_a_model_file_of_any_contents_is_read_or_refused_in_a_line(written, tmp_path):
+    """Single values of a file are replaced at random."""
+    document = json.loads(written[1].read_text("utf-8"))
+    places = [place for place in list_places(document) if place]
+    stream = np.random.default_rng(7)
+    path = tmp_path / "changed.json"
+    refused = 0
+    for number in stream.permutation(len(places))[:60]:
+        changed = json.loads(written[1].read_text("utf-8"))
+        parent = changed
+        for key in places[number][:-1]:
+            parent = parent[key]
+        values = [None, -1, 1e9, "x", [], {}, [[1.0]]]
+        parent[places[number][-1]] = values[stream.integers(len(values))]
+        path.write_text(json.dumps(changed), "utf-8")
+        try:
+            read_again(path)
+        except InputError as refusal:
+            assert "\n" not in str(refusal)
+            refused += 1
+    assert refused > 40
+
+
 def test_an_effect_of_a_missing_plug_in_is_named(written):
     contents = read_model_file(written[1])
     contents.fit.model["effects"][3] = "hoses@2"

@@ -40,6 +40,7 @@ from elastocal.fitting.stored_models import restore_model, serialize_model
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.documents import check_document
 from elastocal.io.json_files import read_json
+from elastocal.io.texts import check_file
 from elastocal.io.typed_json import (
     OMITTED_BY_DEFAULT,
     build_json_schema,
@@ -76,6 +77,8 @@ VERSION = 1
 _WRITTEN_BY = "a file that CorrectedRobot.save or `elastocal export` has written"
 _INNERMOST_LIST = re.compile(r"\[\s+([^\[\]{}]*?)\s+\]")
 _BLANKS = re.compile(r"\s+")
+# Upper bound on the size of a file: a campaign of 100,000 states has some 40 MB.
+_LARGEST_BYTES = 500_000_000
 # What messages about a law without formula name.
 _PART = "model file"
 # Types of the columns of states that are no floating-point numbers.
@@ -467,6 +470,10 @@ def read_model_file(path: str | Path) -> ModelFile:
     InputError
         It is no model file, or one of a later version, or was changed by hand.
     """
+    size = check_file(path, _WRITTEN_BY)
+    if size > _LARGEST_BYTES:
+        allowed = f"at most {_LARGEST_BYTES // 1_000_000} MB"
+        raise InputError(path, "", f"a file of {size // 1_000_000} MB", allowed)
     document = read_json(path)
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise InputError(path, "format", "no model file", _WRITTEN_BY)
@@ -488,8 +495,19 @@ def restore_calibrated(contents: ModelFile, source: str | Path) -> CalibratedRob
     Raises
     ------
     InputError
-        The file names an effect that this installation does not have.
+        The file names an effect that this installation does not have, or its parts do
+        not belong together.
     """
+    try:
+        return _restore(contents, source)
+    except InputError:
+        raise
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
+        finding = f"parts that do not belong together ({error})"
+        raise InputError(source, "fit", finding, _WRITTEN_BY) from None
+
+
+def _restore(contents: ModelFile, source: str | Path) -> CalibratedRobot:
     check_document(contents.robot, "robot", str(source))
     robot = parse_robot(contents.robot, str(source))
     record = contents.fit
