@@ -36,6 +36,7 @@ from scipy.stats import chi, ncx2
 from elastocal.application.accuracy import CONFIDENCE, predict_errors
 from elastocal.application.calibrated import compute_pose_sensitivities, predict_poses
 from elastocal.application.frames import (
+    BASE,
     ROBOT,
     Scope,
     compute_placement_columns,
@@ -47,6 +48,7 @@ from elastocal.fitting.least_squares import align_points
 from elastocal.validation.conformity import MIN_CONFIGURATIONS
 
 if TYPE_CHECKING:
+    from elastocal.application.accuracy import ErrorPrediction
     from elastocal.application.calibrated import CalibratedRobot
 
 # Level of both tests: this share of correct predictions is called wrong by chance, and
@@ -412,3 +414,59 @@ def predict_over_targets(
     placed = place_over_targets(calibrated, targets, free)
     prediction = predict_errors(placed, targets.joint_angles, targets.wrench)
     return prediction.rms_m, prediction.repeated_m
+
+
+@dataclass(frozen=True)
+class TargetComparison:
+    """Measured and predicted errors of commanded targets.
+
+    Attributes
+    ----------
+    calibrated : the robot.
+    targets : the targets.
+    errors : measured errors.
+    sensor_m : (N,) standard deviation of the tracker's noise in a coordinate.
+    subtracted_m : (N,) the same, or 0 if it is only known from the residual of the fit.
+    now : predicted errors by the present diagnosis, in the frame of the campaign.
+    prediction, remaining : results of the tests.
+    measured_rms_m : (draws,) RMS errors of the robot at targets like these.
+    """
+
+    calibrated: CalibratedRobot
+    targets: CommandedTargets
+    errors: MeasuredErrors
+    sensor_m: np.ndarray
+    subtracted_m: np.ndarray
+    now: ErrorPrediction
+    prediction: PredictionTest
+    remaining: RemainingError
+    measured_rms_m: np.ndarray
+
+
+def compare_targets(
+    calibrated: CalibratedRobot,
+    targets: CommandedTargets,
+    offset_m: tuple[float, ...] | None,
+) -> TargetComparison:
+    """Compare measured with predicted errors; `offset_m` is as in
+    `compute_measured_errors`."""
+    noise = calibrated.noise
+    base_known = calibrated.scope.frame == BASE
+    errors = compute_measured_errors(targets, offset_m, base_known=base_known)
+    sensor_m = noise.position_m / np.sqrt(targets.repeats)
+    # A noise that is only known from the residual contains errors of the robot.
+    subtracted_m = sensor_m if noise.source != "residual" else 0.0 * sensor_m
+    predicted_rms_m, repeated_m = predict_over_targets(calibrated, targets, errors.free)
+    return TargetComparison(
+        calibrated,
+        targets,
+        errors,
+        sensor_m,
+        subtracted_m,
+        predict_errors(calibrated, targets.joint_angles, targets.wrench),
+        check_prediction(errors, predicted_rms_m, targets.bound_m, sensor_m),
+        find_remaining_error(errors, repeated_m, sensor_m),
+        draw_measured_rms(
+            errors, targets.configuration, subtracted_m, noise.degrees_of_freedom
+        ),
+    )

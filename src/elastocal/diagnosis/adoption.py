@@ -157,14 +157,13 @@ def describe_losses(
             )
             for model in (fitted, frames)
         )
-        loss = squares - frames_squares
-        if loss.mean() > loss.std(ddof=1) / np.sqrt(len(loss)):
+        if _count_std_errors(squares, frames_squares) > 1.0:
             rms_mm = 1e3 * np.sqrt(squares.mean())
             frames_rms_mm = 1e3 * np.sqrt(frames_squares.mean())
             sentences[-1] = (
                 f"training poses left out in turn are off by {rms_mm:.2f} mm RMS by the"
                 f" {name}, by {frames_rms_mm:.2f} mm with frames and targets alone:"
-                f" {len(loss)} poses are too few for {effective:.0f} parameters, and"
+                f" {len(squares)} poses are too few for {effective:.0f} parameters, and"
                 f" the {name} is not kept"
             )
     return sentences if sentences[-1] else []

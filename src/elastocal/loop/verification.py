@@ -12,17 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal import __version__
-from elastocal.application.accuracy import predict_errors
-from elastocal.application.frames import BASE, ROBOT, root_mean_square
+from elastocal.application.frames import ROBOT, root_mean_square
 from elastocal.application.verification import (
     CommandedTargets,
     add_noise_to_bound,
-    check_prediction,
+    compare_targets,
     compute_measured_errors,
-    draw_measured_rms,
-    find_remaining_error,
     list_verification_shortfalls,
-    predict_over_targets,
 )
 from elastocal.campaigns.campaign import DOCUMENT, average_by_group
 from elastocal.campaigns.holdout import list_poses, number_configurations
@@ -54,13 +50,8 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from elastocal.application.accuracy import ErrorPrediction
     from elastocal.application.calibrated import CalibratedRobot
-    from elastocal.application.verification import (
-        MeasuredErrors,
-        PredictionTest,
-        RemainingError,
-    )
+    from elastocal.application.verification import MeasuredErrors, TargetComparison
     from elastocal.campaigns.campaign import Campaign, Measurements, Target
     from elastocal.campaigns.campaign_folder import CampaignFolder
     from elastocal.loop.calibrated_files import DiagnosedCampaign
@@ -178,7 +169,9 @@ def verify_robot(
     target = _choose_target(calibrated, measured)
     robot = calibrated.robot
     commanded = _average_measurements(robot, targets, measured, target.name)
-    comparison = _compare(calibrated, commanded, target)
+    comparison = compare_targets(
+        calibrated, commanded, _relate_to_end_effector(target, calibrated)
+    )
     certificate = None
     if tolerance_m is not None:
         certificate = _certify(comparison, tolerance_m, accepted_risk)
@@ -194,64 +187,8 @@ def verify_robot(
     return Verification(document, _tabulate(comparison))
 
 
-@dataclass(frozen=True)
-class _Comparison:
-    """Measured and predicted errors of commanded targets.
-
-    Attributes
-    ----------
-    calibrated : the robot.
-    targets : the targets.
-    errors : measured errors.
-    sensor_m : (N,) standard deviation of the tracker's noise in a coordinate.
-    subtracted_m : (N,) the same, or 0 if it is only known from the residual of the fit.
-    now : predicted errors by the present diagnosis, in the frame of the campaign.
-    prediction, remaining : results of the tests.
-    measured_rms_m : (draws,) RMS errors of the robot at targets like these.
-    """
-
-    calibrated: CalibratedRobot
-    targets: CommandedTargets
-    errors: MeasuredErrors
-    sensor_m: np.ndarray
-    subtracted_m: np.ndarray
-    now: ErrorPrediction
-    prediction: PredictionTest
-    remaining: RemainingError
-    measured_rms_m: np.ndarray
-
-
-def _compare(
-    calibrated: CalibratedRobot, targets: CommandedTargets, target: Target
-) -> _Comparison:
-    """Compare measured with predicted errors."""
-    noise = calibrated.noise
-    errors = compute_measured_errors(
-        targets,
-        _relate_to_end_effector(target, calibrated),
-        base_known=calibrated.scope.frame == BASE,
-    )
-    sensor_m = noise.position_m / np.sqrt(targets.repeats)
-    # A noise that is only known from the residual contains errors of the robot.
-    subtracted_m = sensor_m if noise.source != "residual" else 0.0 * sensor_m
-    predicted_rms_m, repeated_m = predict_over_targets(calibrated, targets, errors.free)
-    return _Comparison(
-        calibrated,
-        targets,
-        errors,
-        sensor_m,
-        subtracted_m,
-        predict_errors(calibrated, targets.joint_angles, targets.wrench),
-        check_prediction(errors, predicted_rms_m, targets.bound_m, sensor_m),
-        find_remaining_error(errors, repeated_m, sensor_m),
-        draw_measured_rms(
-            errors, targets.configuration, subtracted_m, noise.degrees_of_freedom
-        ),
-    )
-
-
 def _certify(
-    comparison: _Comparison, tolerance_m: float, accepted_risk: float
+    comparison: TargetComparison, tolerance_m: float, accepted_risk: float
 ) -> dict[str, Any]:
     """Decide on a tolerance by the measured and by the predicted errors of the same
     targets."""
@@ -267,7 +204,9 @@ def _certify(
     }
 
 
-def _describe_errors(comparison: _Comparison, accepted_risk: float) -> dict[str, Any]:
+def _describe_errors(
+    comparison: TargetComparison, accepted_risk: float
+) -> dict[str, Any]:
     """Return the errors of a verification as part of its document."""
     targets = comparison.targets
     distance_m = comparison.errors.distance_m
@@ -384,7 +323,7 @@ def _remark_on_frame(
     ]
 
 
-def _tabulate(comparison: _Comparison) -> pd.DataFrame:
+def _tabulate(comparison: TargetComparison) -> pd.DataFrame:
     """Tabulate predicted and measured errors by target."""
     import pandas as pd
 

@@ -34,10 +34,8 @@ from elastocal.application.frames import (
 )
 from elastocal.application.verification import (
     CommandedTargets,
-    check_prediction,
+    compare_targets,
     compute_measured_errors,
-    draw_measured_rms,
-    predict_over_targets,
 )
 from elastocal.campaigns.holdout import number_configurations
 from elastocal.campaigns.reading import read_robot
@@ -539,20 +537,15 @@ def _verify(
     the same frame; `chosen` are the poses that are verified, (N,) of bool."""
     targets = _collect_targets(wanted, moved, chosen)
     reached = replace(targets, measured=moved.position[chosen])
-    base_known = calibrated.scope.frame == BASE
-    errors, true_errors = (
-        compute_measured_errors(compared, (0.0, 0.0, 0.0), base_known=base_known)
-        for compared in (targets, reached)
+    offset_m = (0.0, 0.0, 0.0)
+    comparison = compare_targets(calibrated, targets, offset_m)
+    true_errors = compute_measured_errors(
+        reached, offset_m, base_known=calibrated.scope.frame == BASE
     )
-    sensor_m = np.full(len(targets), calibrated.noise.position_m)
-    predicted_rms_m, _ = predict_over_targets(calibrated, targets, errors.free)
-    test = check_prediction(errors, predicted_rms_m, targets.bound_m, sensor_m)
-    measured_rms_m = draw_measured_rms(
-        errors, targets.configuration, sensor_m, calibrated.noise.degrees_of_freedom
-    )
+    measured_rms_m = comparison.measured_rms_m
     decision = decide_conformity(measured_rms_m, tolerance_m, _RISK)
     return {
-        "prediction_held": test.held,
+        "prediction_held": comparison.prediction.held,
         "verified_true_rms_m": float(np.sqrt(true_errors.mean_square)),
         "verified_bound_m": float(np.quantile(measured_rms_m, 1.0 - _RISK)),
         "verified_decision": decision.decision,
