@@ -127,7 +127,7 @@ class _SmoothSteps:
         """Find the steps, which have to be shorter than half a turn."""
         length = candidates.exclusion[:, :-1].T[:, :, None]
         length = length + candidates.exclusion[:, 1:].T[:, None, :]
-        shifts = np.zeros((*length.shape, len(candidates.copies)), int)
+        shifts = np.zeros((*length.shape, len(candidates.copies)), np.int8)
         for joint, count in enumerate(candidates.turns):
             lowest = candidates.copies[joint][..., 0].T
             difference = lowest[1:, None, :] - lowest[:-1, :, None]
