@@ -8,8 +8,13 @@ import numpy as np
 import pytest
 from made_problems import make_problem, make_rows, make_term
 
+from elastocal.diagnosis import search
 from elastocal.diagnosis.discrepancy import NEIGHBOURS
-from elastocal.diagnosis.evidence import evaluate_model, log_sum_exp
+from elastocal.diagnosis.evidence import (
+    evaluate_extensions,
+    evaluate_model,
+    log_sum_exp,
+)
 from elastocal.diagnosis.hypotheses import GROSS_ERROR, OTHER
 from elastocal.diagnosis.search import search_from_starts, search_models
 from elastocal.diagnosis.settings import Settings
@@ -149,3 +154,30 @@ def test_gross_errors_that_lead_are_added_in_few_steps():
     assert posterior.probabilities[0] == pytest.approx(expected[wrong], abs=0.01)
     grown = {len(model) for model in search.extended if set(model) < set(wrong)}
     assert grown < set(range(len(wrong)))
+
+
+def test_sizes_of_the_pose_error_without_probability_do_not_matter(monkeypatch):
+    """Models are extended at the sizes that are likely under them; a model in which a
+    few sizes are likely gets the extensions that all sizes give it."""
+    rows = make_rows(0, poses=40, candidates=10).drawn(np.random.default_rng(1), 2.0)
+    signal = 3.0 * rows.candidates[:, 0] + 3.0 * rows.candidates[:, 1]
+    rows = replace(rows, residual=rows.residual + signal)
+    tau = [0.0, 0.5, 2.0, 8.0, 32.0]
+    counts = []
+
+    def evaluate_and_count(statistics, *arguments):
+        counts.append(len(statistics.pose_error_rad))
+        return evaluate_extensions(statistics, *arguments)
+
+    monkeypatch.setattr(search, "evaluate_extensions", evaluate_and_count)
+    monkeypatch.setattr(search, "NEGLIGIBLE_LOG_WEIGHT", -np.inf)
+    found = search_models(make_problem(rows, TERMS, tau=tau)[0])
+    fewest = min(counts)
+    monkeypatch.setattr(search, "_NEGLIGIBLE_FOR_EXTENSIONS", -np.inf)
+    counts.clear()
+    expected = search_models(make_problem(rows, TERMS, tau=tau)[0])
+    assert fewest < min(counts)
+    assert [model.term_indices for model in found.models] == [
+        model.term_indices for model in expected.models
+    ]
+    assert found.probabilities == pytest.approx(expected.probabilities, abs=1e-9)

@@ -26,7 +26,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import lapack, solve_triangular
+from scipy.linalg import blas, lapack
 from scipy.special import log_ndtr
 
 if TYPE_CHECKING:
@@ -305,12 +305,10 @@ def _condition_on_model(
         [statistics.gram_rows(columns), statistics.score[:, columns, None]], axis=2
     )
     if len(columns):
-        right = np.array(
-            [
-                solve_triangular(lower, rows, lower=True, check_finite=False)
-                for lower, rows in zip(factor, right, strict=True)
-            ]
-        )
+        for lower, rows in zip(factor, right, strict=True):
+            # The transposes have the column order that BLAS expects, so that it solves
+            # X L' = rows' without copies.
+            rows[:] = blas.dtrsm(1.0, lower.T, rows.T, side=1, overwrite_b=1).T
     cross = right[..., :-1]
     fitted = right[..., -1]
     log_diagonal = np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)

@@ -59,6 +59,9 @@ _TELLING_TERMS = 10
 # are dropped for the rest of the search. Models that come near to the best one differ
 # from it by a few terms, which cannot make up for a hundred orders of magnitude.
 _HOPELESS_LOG_WEIGHT = -300.0
+# Below this log weight under a model, a size of the pose error counts for nothing when
+# the model is extended by a term.
+_NEGLIGIBLE_FOR_EXTENSIONS = -40.0
 # Steps in the grid of the pose error, to either side of its size, that measurements
 # simulated with this size can make likely.
 POSE_ERROR_REACH = 2
@@ -139,12 +142,14 @@ class ScoredModel:
     log_odds : posterior log odds against the declared model alone
     scales : (m,), most probable scale of each term
     pose_error_rad : most probable error that the measurements of a pose have in common
+    likely_pose_errors_rad : smallest and largest size of it that has any probability
     """
 
     term_indices: TermSet
     log_odds: float
     scales: np.ndarray
     pose_error_rad: float
+    likely_pose_errors_rad: tuple[float, float] = (0.0, np.inf)
 
 
 @dataclass(frozen=True)
@@ -328,11 +333,13 @@ class BeamSearch:
         open_terms = np.flatnonzero(~np.isin(self._slots, self._slots[list(model)]))
         if not len(open_terms):
             return
+        likely = self._select_likely_pose_errors(model)
+        statistics = self.statistics.at(likely)
         before, by_pose_error = evaluate_extensions(
-            self.statistics,
-            self.statistics.log_likelihood + self._log_pose,
+            statistics,
+            statistics.log_likelihood + self._log_pose[likely],
             self.problem.scaled_columns(model, self.scales[model]),
-            self._blocks,
+            [block.at(likely) for block in self._blocks],
             self.problem.grid,
         )
         by_pose_error += self._log_weights
@@ -341,6 +348,16 @@ class BeamSearch:
             self._drop_unlikely_pose_errors(by_pose_error, by_scale)
         log_evidence = float(log_sum_exp(before))
         self._meet_extensions(model, open_terms, log_evidence, by_scale)
+
+    def _select_likely_pose_errors(self, model: TermSet) -> slice:
+        """Select the sizes of the pose error that are likely under a model, or all as
+        long as it has not been evaluated."""
+        if model not in self.evaluated:
+            return slice(None)
+        smallest, largest = self.evaluated[model].likely_pose_errors_rad
+        sizes = self.statistics.pose_error_rad
+        first = int(np.searchsorted(sizes, smallest))
+        return slice(first, int(np.searchsorted(sizes, largest, "right")))
 
     def _drop_unlikely_pose_errors(
         self, by_pose_error: np.ndarray, by_scale: np.ndarray
@@ -438,12 +455,15 @@ class BeamSearch:
         terms = self.problem.terms
         log_prior = self.problem.prior.compute_log_odds(terms[n] for n in model)
         log_odds = evidence.log_evidence - self.empty_evidence.log_evidence + log_prior
-        best_pose_error = np.argmax(evidence.log_pose_posterior)
+        sizes = self.statistics.pose_error_rad
+        log_weights = evidence.log_pose_posterior
+        likely = sizes[log_weights > log_weights.max() + _NEGLIGIBLE_FOR_EXTENSIONS]
         scored = ScoredModel(
             model,
             log_odds,
             evidence.scales,
-            float(self.statistics.pose_error_rad[best_pose_error]),
+            float(sizes[np.argmax(log_weights)]),
+            (float(likely[0]), float(likely[-1])),
         )
         self.log_odds[model] = log_odds
         self.scales[model] = tuple(evidence.scales.tolist())

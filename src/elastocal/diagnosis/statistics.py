@@ -374,13 +374,18 @@ class SufficientStatistics:
 
     def gram_rows(self, columns: np.ndarray) -> np.ndarray:
         """Rows (T, D, K) of W'MW of some columns (D,)."""
+        gram = self.gram.take(columns, axis=1)
+        if not self.low_rank.shape[2]:
+            return gram
         low_rank = self.low_rank[:, columns]
-        return self.gram[:, columns] - low_rank @ self.low_rank.swapaxes(-1, -2)
+        return gram - low_rank @ self.low_rank.swapaxes(-1, -2)
 
     def gram_blocks(self, columns: np.ndarray) -> np.ndarray:
         """Blocks (T, ..., D, D) of W'MW of some columns (..., D)."""
-        low_rank = self.low_rank[:, columns]
         gram = self.gram[:, columns[..., None], columns[..., None, :]]
+        if not self.low_rank.shape[2]:
+            return gram
+        low_rank = self.low_rank[:, columns]
         return gram - low_rank @ low_rank.swapaxes(-1, -2)
 
 
