@@ -30,6 +30,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -168,20 +169,26 @@ class _Target:
     def is_reproduced_by(self, indices: Sequence[int]) -> bool:
         """Whether terms of one mechanism reproduce the displacements within the
         tolerance of laws."""
-        alone = self.build_system([])
-        tolerance = self.problem.settings.law_tolerance**2
-        largest = tolerance * alone.compute_residual(alone.forced)
         system = self.build_system(self._choose_variants(indices))
-        selected = system.forced.copy()
+        selected: list[int] = []
         for _ in self.columns:
-            gains = system.compute_gains(selected)
+            _, gains = system.solve(selected)
             best = int(np.argmax(gains))
             if gains[best] <= 0.0:
                 return False
-            selected[best] = True
-            if system.compute_residual(selected) <= largest:
+            selected.append(best)
+            explained, _ = system.solve(selected)
+            if explained >= self.least_explained:
                 return True
         return False
+
+    @cached_property
+    def least_explained(self) -> float:
+        """Squares that another mechanism must explain to reproduce the displacements:
+        of those that the companions leave, all but the tolerance of laws."""
+        alone = self.build_system([])
+        left = alone.total - alone.solve([])[0]
+        return alone.total - self.problem.settings.law_tolerance**2 * left
 
     def _choose_variants(self, indices: Sequence[int]) -> list[int]:
         """Of the variants at each location, choose the one that reproduces most."""
@@ -199,36 +206,14 @@ class _Target:
 
     def compute_explained_squares(self, indices: Sequence[int]) -> dict[int, float]:
         """Squares that the companions and each single term explain, by the index of the
-        term; the companions are eliminated once for all terms.
-
-        With coefficients c that solve (G + I) c = p, these are 2 c'p - c'G c =
-        c'p + c'c.
-        """
+        term; the companions are eliminated once for all terms."""
         system = self.build_system(indices)
-        count = int(system.forced.sum())
-        cross = system.gram[:count, count:]
-        own_gram = system.gram[count:, count:]
-        own_products = system.products[count:]
-        eliminated = solve_positive_definite(
-            system.gram[:count, :count] + np.eye(count),
-            np.column_stack([cross, system.products[:count]]),
-        )
-        score = own_products - cross.T @ eliminated[:, -1]
         explained = {}
         first = 0
         for index in indices:
             width = len(self.problem.terms[index].columns)
-            own = slice(first, first + width)
+            explained[index] = system.solve([*range(first, first + width)])[0]
             first += width
-            shared = cross[:, own].T @ eliminated[:, own]
-            coefficients = solve_positive_definite(
-                own_gram[own, own] - shared + np.eye(width), score[own]
-            )
-            companions = eliminated[:, -1] - eliminated[:, own] @ coefficients
-            explained[index] = float(
-                coefficients @ (own_products[own] + coefficients)
-                + companions @ (system.products[:count] + companions)
-            )
         return explained
 
     def build_system(self, indices: Sequence[int]) -> _RidgeSystem:
@@ -244,55 +229,87 @@ class _Target:
         statistics = problem.statistics.at(slice(self.index, self.index + 1))
         gram = statistics.gram_blocks(np.concatenate([self.columns, columns]))[0]
         products = gram[:, :count] @ self.coefficients
-        forced = np.zeros(len(columns), bool)
-        companions = [problem.terms[index].columns for index in self.companions]
-        forced[: sum(map(len, companions))] = True
-        return _RidgeSystem(
-            total=float(self.coefficients @ products[:count]),
-            products=prior_std * products[count:],
-            gram=prior_std[:, None] * gram[count:, count:] * prior_std,
-            forced=forced,
+        widths = [len(problem.terms[index].columns) for index in self.companions]
+        return _RidgeSystem.eliminate(
+            float(self.coefficients @ products[:count]),
+            prior_std * products[count:],
+            prior_std[:, None] * gram[count:, count:] * prior_std,
+            sum(widths),
         )
 
 
 @dataclass(frozen=True)
 class _RidgeSystem:
-    """Ridge regression of displacements on columns in units of their prior deviations.
+    """Ridge regression of displacements on R columns in units of their prior
+    deviations, beside F companions that every regression has and that are eliminated.
 
     Attributes
     ----------
     total
         Sum of squares of the displacements.
-    products
-        (D,) products of the columns with the displacements.
-    gram
-        (D, D) products of the columns.
-    forced
-        (D,) of bool, columns that every regression has.
+    companion_products, products
+        (F,) and (R,), of the columns with the displacements.
+    squares
+        (R,) sums of squares of the columns.
+    eliminated
+        (F, R + 1) solutions of the companions for each column and the displacements.
+    precision, score
+        (R, R) and (R,), equations of the columns given the companions.
     """
 
     total: float
+    companion_products: np.ndarray
     products: np.ndarray
-    gram: np.ndarray
-    forced: np.ndarray
+    squares: np.ndarray
+    eliminated: np.ndarray
+    precision: np.ndarray
+    score: np.ndarray
 
-    def compute_residual(self, selected: np.ndarray) -> float:
-        """Sum of squares that the selected columns leave."""
-        coefficients = self._solve(selected)
-        explained = coefficients @ (2.0 * self.products - self.gram @ coefficients)
-        return float(self.total - explained)
-
-    def compute_gains(self, selected: np.ndarray) -> np.ndarray:
-        """Squares that each further column explains by itself, (D,); zero for the
-        selected ones."""
-        gradient = self.products - self.gram @ self._solve(selected)
-        gains = gradient**2 / (1.0 + np.diag(self.gram))
-        return np.where(selected, 0.0, gains)
-
-    def _solve(self, selected: np.ndarray) -> np.ndarray:
-        coefficients = np.zeros(len(self.products))
-        precision = self.gram[np.ix_(selected, selected)] + np.eye(selected.sum())
-        coefficients[selected] = solve_positive_definite(
-            precision, self.products[selected]
+    @classmethod
+    def eliminate(
+        cls, total: float, products: np.ndarray, gram: np.ndarray, count: int
+    ) -> _RidgeSystem:
+        """Eliminate the first columns from the equations of all, with the products of
+        the columns with the displacements and with each other."""
+        cross = gram[:count, count:]
+        eliminated = solve_positive_definite(
+            gram[:count, :count] + np.eye(count),
+            np.column_stack([cross, products[:count]]),
         )
-        return coefficients
+        own_gram = gram[count:, count:]
+        return cls(
+            total,
+            products[:count],
+            products[count:],
+            np.diag(own_gram),
+            eliminated,
+            own_gram + np.eye(len(own_gram)) - cross.T @ eliminated[:, :-1],
+            products[count:] - cross.T @ eliminated[:, -1],
+        )
+
+    def solve(self, selected: Sequence[int]) -> tuple[float, np.ndarray]:
+        """Regress on the companions and the selected columns.
+
+        With coefficients c that solve (G + I) c = p, the regression explains the
+        squares 2 c'p - c'G c = c'p + c'c.
+
+        Returns
+        -------
+        float
+            Squares that they explain.
+        ndarray
+            (R,) squares that each further column would explain by itself; zero for the
+            selected ones.
+        """
+        coefficients = solve_positive_definite(
+            self.precision[np.ix_(selected, selected)], self.score[selected]
+        )
+        companions = (
+            self.eliminated[:, -1] - self.eliminated[:, selected] @ coefficients
+        )
+        explained = coefficients @ (self.products[selected] + coefficients)
+        explained += companions @ (self.companion_products + companions)
+        gradient = self.score - self.precision[:, selected] @ coefficients
+        gains = gradient**2 / (1.0 + self.squares)
+        gains[selected] = 0.0
+        return float(explained), gains
