@@ -361,29 +361,39 @@ def predict_left_out_residuals(
     residual = fitted.whiten(fitted.residual)
     variance, axes = np.linalg.eigh(fitted.covariance)
     covariance_root = axes * np.sqrt(np.maximum(variance, 0.0))
-    blocks = list(fitted.iterate_sensitivities(observations))
-    plain = np.concatenate([block[1] for block in blocks])
-    whitened = np.concatenate([block[2] @ covariance_root for block in blocks])
-    left_out = np.empty_like(fitted.residual)
-    for number in range(group.max() + 1):
-        members = group == number
-        step = covariance_root @ _solve_without(whitened[members], residual[members])
-        left_out[members] = fitted.residual[members] + plain[members] @ step
+    parameters = len(covariance_root)
+    gram = np.zeros((group.max() + 1, parameters, parameters))
+    gradient = np.zeros((len(gram), parameters))
+    blocks = []
+    for indices, plain, whitened in fitted.iterate_sensitivities(observations):
+        blocks.append((indices, plain))
+        scaled = whitened @ covariance_root
+        for number in np.unique(group[indices]).tolist():
+            members = group[indices] == number
+            of_group = residual[indices][members].ravel()
+            rows = scaled[members].reshape(of_group.size, parameters)
+            gram[number] += rows.T @ rows
+            gradient[number] += rows.T @ of_group
+    changes = map(_solve_without, gram, gradient)
+    steps = np.array([covariance_root @ change for change in changes])
+    left_out = fitted.residual.copy()
+    for indices, plain in blocks:
+        left_out[indices] += (plain @ steps[group[indices], :, None])[..., 0]
     return left_out
 
 
-def _solve_without(sensitivities: np.ndarray, residual: np.ndarray) -> np.ndarray:
+def _solve_without(gram: np.ndarray, gradient: np.ndarray) -> np.ndarray:
     """Change of parameters when rows leave a fit, in coordinates in which the parameter
     covariance is the unit matrix.
 
-    With U S V' the sensitivities (M, rows, P) of these rows, it is V S / (1 - S^2) U' r;
-    zero along what no other row determines.
+    With V S V' the Gram matrix of the sensitivities to these rows (P, P), and g their
+    products with the residual (P,), it is V / (1 - S) V' g; zero along what no other
+    row determines.
     """
-    rows = sensitivities.reshape(residual.size, sensitivities.shape[2])
-    left, singular, right = np.linalg.svd(rows, full_matrices=False)
-    share_of_others = 1.0 - singular**2
+    shares, axes = np.linalg.eigh(gram)
+    share_of_others = 1.0 - shares
     is_determined = share_of_others > _SHARE_ROUNDING
-    factor = np.where(is_determined, singular, 0.0)
-    factor /= np.where(is_determined, share_of_others, 1.0)
-    change: np.ndarray = right.T @ (factor * (left.T @ residual.ravel()))
+    along_axes = np.where(is_determined, axes.T @ gradient, 0.0)
+    along_axes /= np.where(is_determined, share_of_others, 1.0)
+    change: np.ndarray = axes @ along_axes
     return change
