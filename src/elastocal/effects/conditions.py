@@ -140,9 +140,9 @@ class Conditions:
         """Compute the generalized force of a wrench (S, 6) at the last measuring point,
         ndarray (S, number of coordinates)."""
         wrench_at_base = wrench.T.copy()
-        wrench_at_base[3:] += np.cross(
-            self.motion.position[0], wrench_at_base[:3], axis=0
-        )
+        moment = np.empty_like(self.motion.position[0])
+        multiply_vectors(self.motion.position[0], wrench_at_base[:3], moment)
+        wrench_at_base[3:] += moment
         return self.motion.generalized_forces(
             self.sites.tracked_points[0].after, wrench_at_base, coordinates
         ).T

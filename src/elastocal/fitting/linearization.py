@@ -57,6 +57,9 @@ _AT_ONCE = 1_500_000
 # nearly linear over such a step.
 _SHAPE_STEP = 1e-4
 _LOAD_STEP = 1e-4
+# Families of effects that turn the joints by a load of their own. They act through the
+# compliances, and do not depend on the load by the masses.
+_OWN_LOAD = ("gravity", "load")
 # The step in a shape is no smaller than that of this share of its highest value.
 _SHAPE_STEP_FLOOR = 0.1
 
@@ -493,9 +496,11 @@ def _add_slopes(
 
 def _depends_on(effect: Candidate, *, is_compliance: bool) -> bool:
     """Whether an effect acts through the compliances, or through the masses."""
+    has_own_load = effect.family in _OWN_LOAD
     if is_compliance:
-        return effect.family in ("gravity", "load")
-    return "load" in effect.needs and effect.effect not in LOAD_EFFECTS
+        return has_own_load
+    is_loaded = "load" in effect.needs and effect.effect not in LOAD_EFFECTS
+    return is_loaded and not has_own_load
 
 
 def _step_each_compliance(
