@@ -286,8 +286,10 @@ class _RandomRobots:
         shape = (*by_repeats.shape[::2], len(self.repeatability_scale))
         errors = by_repeats @ self.stream.standard_normal(shape)
         errors *= self.repeatability_scale
-        # One product of two matrices is faster than one for each pose.
-        flat = by_parameters.reshape(-1, by_parameters.shape[2])
+        # One product of two matrices is faster than one for each pose. The number of rows
+        # is given, since a model without parameters leaves nothing to infer it from.
+        rows = 3 * len(by_parameters)
+        flat = by_parameters.reshape(rows, by_parameters.shape[2])
         errors += (flat @ self.standard_normal).reshape(errors.shape)
         return errors
 
