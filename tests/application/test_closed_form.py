@@ -108,9 +108,9 @@ def test_other_arms_have_no_closed_form(text):
 
 
 def test_an_exact_arm_is_preferred_to_a_nearly_exact_one():
-    """The wrist centre of this arm with parallel axes is 12 mm off axis 4."""
+    """The last three axes of this arm with parallel axes miss each other by 12 mm."""
     text = (
-        "Rz(q1) Ry(q2) Tz(0.6) Ry(q3) Tx(0.5) Ry(q4) Tx(0.012) Rz(q5) Tz(0.1) Ry(q6)"
+        "Rz(q1) Ry(q2) Tz(0.6) Ry(q3) Tx(0.5) Ry(q4) Tx(0.012) Rz(q5) Tz(0.01) Ry(q6)"
         " [6DoF]"
     )
     arm = find_closed_form(parse_chain(text, {}, ""))
@@ -151,6 +151,18 @@ def test_an_arm_with_parallel_axes_has_pairs_of_postures(name):
             both = is_reached[first] & is_reached[second]
             distances = measure_distances(angles[first], angles[second])
             assert distances[both].min() > 1e-4
+
+
+def test_an_aligned_wrist_of_a_stretched_arm_leaves_a_start_for_newtons_method():
+    """Joint 6 has any angle if axis 6 is parallel to axes 2 to 4, and with most of them
+    the stretched elbow does not reach the pose."""
+    chain = analysed("ur10").chain
+    drawn = draw_angles()
+    drawn[:, 2] = 1e-3
+    drawn[:, 4] = 0.0
+    pose = compute_poses(chain, drawn, chain.end_effector)
+    _, is_reached = solve(chain, *pose)
+    assert is_reached.any(axis=0).all()
 
 
 signs = st.lists(st.sampled_from(["", "-"]), min_size=6, max_size=6)
