@@ -6,12 +6,36 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+
 import elastocal
 
 project = "elastocal"
 copyright = "the elastocal developers"
 release = elastocal.__version__
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "extensions"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_gallery.gen_gallery",
+    "extensions",
+]
+
+sphinx_gallery_conf = {
+    "examples_dirs": str(Path(__file__).resolve().parents[2] / "examples"),
+    "gallery_dirs": "examples",
+    # Every example runs; a failing one fails the build.
+    "filename_pattern": r"\.py$",
+    "abort_on_example_error": True,
+    "image_scrapers": ("extensions.scrape_figures",),
+    "reset_modules": ("extensions.forget_plugins",),
+    "capture_repr": ("_repr_html_", "__repr__"),
+    "ignore_repr_types": r"matplotlib\.",
+    "within_subsection_order": "extensions.ExampleOrder",
+    "download_all_examples": False,
+    # Times of one machine would change the pages with each build.
+    "min_reported_time": 1e9,
+    "write_computation_times": False,
+}
 
 myst_enable_extensions = ["dollarmath"]
 # Links to headings, as the hosting site makes them too.

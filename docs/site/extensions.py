@@ -16,6 +16,12 @@ from typing import TYPE_CHECKING, Any
 
 from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
+from matplotlib import pyplot as plt
+from matplotlib.figure import Figure
+from sphinx_gallery.scrapers import figure_rst
+from sphinx_gallery.sorting import ExplicitOrder
+
+from elastocal.effects.catalogue import list_effects
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
@@ -32,6 +38,15 @@ _MENDED = (
 # Landmarks of furo without a name of their own: the pages of the site, and the headings
 # of this page.
 _NAMED = {"sidebar-drawer": "Pages", "toc-drawer": "On this page"}
+# Examples in the order of the gallery.
+_EXAMPLES = (
+    "first_calibration.py",
+    "what_a_robot_lacks.py",
+    "plan_and_correct.py",
+    "own_effect.py",
+    "mujoco_closed_loop.py",
+    "figure_5.py",
+)
 # A figure, with the link that those of the catalogue have already.
 _FIGURE = re.compile(r'(<a [^>]*>\s*)?<img [^>]*?src="([^"]+)"[^>]*>')
 
@@ -94,6 +109,35 @@ def _name_landmarks(app: Sphinx, exception: Exception | None) -> None:
                 f'<aside class="{tag}">', f'<aside class="{tag}" aria-label="{name}">'
             )
         page.write_text(text, encoding="utf-8")
+
+
+def scrape_figures(
+    block: object, block_vars: dict[str, Any], gallery_conf: dict[str, Any]
+) -> str:
+    """Save each figure that an example has given a name, once."""
+    variables = block_vars["example_globals"]
+    saved = variables.setdefault("__saved_figures__", [])
+    paths = []
+    for value in [*variables.values()]:
+        if isinstance(value, Figure) and not any(value is old for old in saved):
+            saved.append(value)
+            paths.append(str(block_vars["image_path_iterator"].next()))
+            value.savefig(paths[-1], dpi=150)
+    return figure_rst(paths, gallery_conf["src_dir"])
+
+
+def forget_plugins(gallery_conf: dict[str, Any], example: str) -> None:
+    """Make the catalogue look for plug-ins again, which one example installs and the
+    others lack; close figures."""
+    list_effects.cache_clear()
+    plt.close("all")
+
+
+class ExampleOrder(ExplicitOrder):
+    """Orders examples as people need them."""
+
+    def __init__(self, source: str) -> None:
+        super().__init__(_EXAMPLES)
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

@@ -19,7 +19,8 @@ From arrays to a corrected robot::
     result.report("report.pdf")
 
 The names of the first five sections are imported from ``elastocal`` itself; they are
-stable, and a name that changes keeps working for one release with a warning. Names below
+stable: a name that has to change keeps working for at least one release with a
+``DeprecationWarning``. Names below
 are those of the modules that they are imported from. None of them needs Snakemake or a
 configuration file. Everything else is internal and may change.
 

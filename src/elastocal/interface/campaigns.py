@@ -108,6 +108,16 @@ class Campaign:
         ------
         InputError
             Names the argument and the row, what was found and what is allowed.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import elastocal as ec
+        >>> robot = ec.read_robot("Rz(q1) Tx(0.3) Rz(q2) Tx(0.2) [tool]")
+        >>> q = np.random.default_rng(1).uniform(-1.0, 1.0, (20, 2))
+        >>> x = 0.3 * np.column_stack([np.cos(q[:, 0]), np.sin(q[:, 0]), 0 * q[:, 0]])
+        >>> ec.Campaign(robot, joint_angles=q, positions=x, frame="base")
+        <Campaign campaign of robot: 20 measurements of 1 target(s) at 20 poses>
         """
         is_pose = rotation_vectors is not None
         has_loads = wrenches is not None and bool(np.any(wrenches))

@@ -59,6 +59,13 @@ class MeasurementPlan:
         m, without the tracker's noise."""
         return float(self.chosen.accuracy_m[-1])
 
+    def __repr__(self) -> str:
+        return (
+            f"<MeasurementPlan: {len(self.joint_angles)} poses to fit and"
+            f" {len(self.held_out_angles)} to validate; the parameters will leave"
+            f" {1e3 * self.predicted_error_m:.3f} mm RMS>"
+        )
+
 
 def plan(
     robot: Robot,
@@ -144,6 +151,14 @@ def simulate(
     -------
     DataFrame
         Columns of measurements.csv, see `Campaign.from_table`.
+
+    Examples
+    --------
+    >>> import elastocal as ec
+    >>> robot = ec.read_robot("Rz(q1) Tx(0.3) Rz(q2) Tx(0.2) [tool]")
+    >>> table = ec.simulate(robot, poses=8, repeats=1)
+    >>> table[["x", "y", "z"]].shape
+    (8, 3)
     """
     import pandas as pd
 
