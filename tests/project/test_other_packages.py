@@ -16,8 +16,12 @@ def read_table():
     """Read the table of the page that benchmarks/peers/run.py writes."""
     page = (ROOT / "docs" / "other_packages_tables.md").read_text("utf-8")
     lines = [line for line in page.splitlines() if line.startswith("|")]
-    header, _, *rows = ([cell.strip() for cell in line.split("|")] for line in lines)
+    header, _, *rows = map(split_row, lines)
     return pd.DataFrame(rows, columns=header)
+
+
+def split_row(line):
+    return [cell.strip() for cell in line.split("|")]
 
 
 TABLE = read_table()
