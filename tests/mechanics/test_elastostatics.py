@@ -38,6 +38,19 @@ def test_offset_that_turns_with_the_tool_loads_the_joints_as_a_force_at_that_tar
     )
 
 
+def test_deflections_are_those_of_the_cartesian_stiffness_of_equation_6(kuka):
+    """The study needs only its inverse, equation 8: the stiffness K = (J C J^T)^-1 gives
+    the wrench back from the exact deflection, under forces that are small enough."""
+    loads = random_loads(kuka, 1, 20, force=0.01)
+    end = kuka.chain.end_effector
+    deflection = compute_true_deflections(kuka, loads, end, "end_effector")
+    jacobian = compute_poses_and_jacobians(kuka.chain, loads.joint_angles, end)[2]
+    compliance = (jacobian * kuka.compliance) @ np.swapaxes(jacobian, -1, -2)
+    stiffness = np.linalg.inv(compliance)
+    wrench = (stiffness @ deflection[..., None])[..., 0]
+    np.testing.assert_allclose(wrench, loads.wrench, rtol=0, atol=1e-4)
+
+
 def test_regressor_has_the_columns_of_equation_10(kuka):
     loads = random_loads(kuka, 1, 3)
     jacobian = compute_poses_and_jacobians(

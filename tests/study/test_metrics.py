@@ -15,7 +15,7 @@ from elastocal.study.metrics import (
     compute_mean_deviation,
     compute_position_errors,
     extrapolate_length,
-    find_first_length_below,
+    find_kept_length,
     make_validation_set,
 )
 from elastocal.study.simulation import compute_true_deflections
@@ -96,10 +96,26 @@ def test_k_sigma_is_the_signed_sum_over_all_joints_or_some():
 
 def test_undetermined_values_count_as_above_the_limit():
     lengths = [
-        find_first_length_below(np.array(values), 1.0)
+        find_kept_length(np.array(values), 1.0)
         for values in ([np.nan, np.nan, 0.1], [np.nan] * 2, [np.inf, -1.0])
     ]
     assert lengths == [3, np.inf, 2]
+
+
+@pytest.mark.parametrize(
+    ("values", "length"),
+    [
+        ([0.9, 0.8, 0.7], 1),
+        ([2.0, 0.9, 1.1, 0.8], 4),
+        ([2.0, -0.9, -1.1, -0.8, 0.9], 4),
+        ([2.0, 0.9, 1.1], np.inf),
+        ([0.9, 0.8, np.nan], np.inf),
+    ],
+)
+def test_a_score_that_leaves_its_limit_again_has_not_kept_it(values, length):
+    """The caption of Table 4 promises the number of configurations from which on a score
+    stays within its limit."""
+    assert find_kept_length(np.array(values), 1.0) == length
 
 
 @given(
@@ -117,7 +133,7 @@ def test_lengths_follow_a_bias_over_the_length_to_any_limit(bias, limit, sign, l
     assume(abs(crossing - np.round(crossing)) > 1e-9 * crossing)
     whole = max(np.ceil(crossing), 1.0)
     reached = whole <= lengths
-    assert find_first_length_below(values, limit) == (whole if reached else np.inf)
+    assert find_kept_length(values, limit) == (whole if reached else np.inf)
     assert extrapolate_length(values, limit) == pytest.approx(
         whole if reached else crossing, rel=1e-12
     )

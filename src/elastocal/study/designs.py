@@ -1,7 +1,9 @@
 """Which configurations to measure (RQ3): random ones against optimal designs.
 
-Candidates are random configurations with their loads; a design is a selection of them.
-Its worth is the error that it leaves in simulated data sets.
+Candidates are random configurations within the joint limits, with their loads; a design
+is a selection of them. Its worth is the error that it leaves in simulated data sets, at
+test configurations within the limits. Criterion I uses configurations of its own, so
+that no design is chosen on the configurations that judge it.
 """
 
 from __future__ import annotations
@@ -52,14 +54,15 @@ class Candidates:
         Without noise.
     observable : (n,) array of bool
         Joints that the loads move.
-    mean_form : (n + 1, n + 1) array
-        Mean squared error over the test configurations as a quadratic form, see
-        `metrics.ValidationSet`.
+    criterion_form, mean_form : (n + 1, n + 1) arrays
+        Mean squared error over the configurations of the criterion, and over the test
+        configurations, as quadratic forms; see `metrics.ValidationSet`.
     """
 
     regressors: np.ndarray
     deflections: np.ndarray
     observable: np.ndarray
+    criterion_form: np.ndarray
     mean_form: np.ndarray
 
 
@@ -76,8 +79,8 @@ def evaluate_designs(
     """Evaluate the errors that designs leave in simulated data sets, for each kind of
     load.
 
-    Joints that the loads do not move are left out, and then the test configurations have
-    the loads of the candidates.
+    All configurations are within the joint limits. Joints that the loads do not move are
+    left out, and then the test configurations have the loads of the candidates.
 
     Parameters
     ----------
@@ -95,8 +98,9 @@ def evaluate_designs(
     dict
         Columns of the table of simulated designs.
     """
+    within_limits = study.with_loading(joint_range="limits")
     for load, direction in loads.items():
-        pool = _draw_candidates(study, candidates, direction)
+        pool = _draw_candidates(within_limits, candidates, direction)
         designs = [
             *_choose_optimal_designs(study, pool, sizes),
             *_draw_random_designs(study, candidates, sizes, load),
@@ -130,12 +134,14 @@ def _draw_candidates(
     regressors = loaded.compute_regressor(experiments)[0, :, :rows]
     size = np.abs(regressors).max(axis=(0, 1))
     observable = size > _SMALLEST_OBSERVABLE_SHARE * size.max()
-    tests = study.draw_tests() if observable.all() else loaded.draw_tests()
+    judged = study if observable.all() else loaded
+    others = judged.draw_experiments([0], study.size.tests, "criterion of designs")
     return Candidates(
         regressors,
         loaded.compute_deflections(experiments)[0, :, :rows],
         observable,
-        loaded.validate_on(tests).mean_form,
+        judged.validate_on(others).mean_form,
+        judged.validate_on(judged.draw_tests()).mean_form,
     )
 
 
@@ -147,7 +153,7 @@ def _choose_optimal_designs(
     scale = study.robot.compliance[observable]
     regressors = pool.regressors[..., observable] * scale / study.size.noise
     # Without its last row and column the form is that of the compliances alone.
-    form = pool.mean_form[np.ix_(observable, observable)]
+    form = pool.criterion_form[np.ix_(observable, observable)]
     criteria = {"I": Criterion(form * np.outer(scale, scale))}
     for kind in CRITERIA:
         if kind != "I":

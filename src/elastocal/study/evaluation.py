@@ -33,7 +33,7 @@ from elastocal.study.metrics import (
     compute_mean_deviation,
     compute_relative_stiffness_error,
     extrapolate_length,
-    find_first_length_below,
+    find_kept_length,
     make_validation_set,
 )
 from elastocal.study.schemas import (
@@ -270,8 +270,8 @@ def _score_replicates(
 def find_length_with_error(
     values: np.ndarray, replicate_values: np.ndarray, limit: float
 ) -> tuple[float, float]:
-    """Find the first length at which a metric is at most `limit`, with its Monte Carlo
-    standard error.
+    """Find the first length from which on a metric stays within `limit`, with its Monte
+    Carlo standard error.
 
     Parameters
     ----------
@@ -284,10 +284,10 @@ def find_length_with_error(
     Returns
     -------
     length : float
-        Infinite if no length reaches the limit.
+        Infinite if the longest data set is not within the limit.
     std_error : float
     """
-    length = float(find_first_length_below(values, limit))
+    length = float(find_kept_length(values, limit))
     replicate_lengths = extrapolate_length(replicate_values, limit)
     return length, float(np.std(replicate_lengths, ddof=1))
 
@@ -397,8 +397,8 @@ def _summarize_curves(
     length: int,
     limits: Mapping[str, float],
 ) -> dict[str, float]:
-    """Summarize scores (studies, lengths): at a length, and the lengths at which they
-    reach their limit."""
+    """Summarize scores (studies, lengths): at a length, and the lengths from which on
+    they stay within their limit."""
     limit = limits[quantity.limit]
     name = f"{quantity.name}_{length}_{quantity.unit}"
     length_name = f"n_{quantity.name}_{limit:g}_{quantity.unit}"

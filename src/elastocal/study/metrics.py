@@ -172,9 +172,9 @@ def compute_k_sigma(
     return errors[..., joints].sum(axis=-1)
 
 
-def find_first_length_below(values: np.ndarray, limit: float) -> np.ndarray:
-    """Find the first data set length at which a metric is at most `limit` in absolute
-    value.
+def find_kept_length(values: np.ndarray, limit: float) -> np.ndarray:
+    """Find the first data set length from which on a metric stays within `limit` in
+    absolute value.
 
     Parameters
     ----------
@@ -185,20 +185,23 @@ def find_first_length_below(values: np.ndarray, limit: float) -> np.ndarray:
     Returns
     -------
     (...) array
-        Infinite if no length reaches the limit.
+        Infinite if the longest data set is not within the limit.
     """
-    below = np.abs(values) <= limit
-    return np.where(below.any(axis=-1), below.argmax(axis=-1) + 1.0, np.inf)
+    above = ~(np.abs(values) <= limit)
+    longest = values.shape[-1]
+    last_above = longest - above[..., ::-1].argmax(axis=-1)
+    kept = np.where(above.any(axis=-1), last_above + 1.0, 1.0)
+    return np.where(kept <= longest, kept, np.inf)
 
 
 def extrapolate_length(values: np.ndarray, limit: float) -> np.ndarray:
     """Data set length at which a metric comes down to `limit`, beyond the longest one if
     necessary.
 
-    As `find_first_length_below`; if that is infinite, the metric is extrapolated as a
-    bias of second order, which falls as 1 / length.
+    As `find_kept_length`; if that is infinite, the metric is extrapolated as a bias of
+    second order, which falls as 1 / length.
     """
-    first = find_first_length_below(values, limit)
+    kept = find_kept_length(values, limit)
     longest = values.shape[-1]
     excess = np.maximum(np.abs(values[..., -1]) / limit, 1.0)
-    return np.where(np.isfinite(first), first, longest * excess)
+    return np.where(np.isfinite(kept), kept, longest * excess)

@@ -17,6 +17,7 @@ import numpy as np
 
 from elastocal.study.in_memory import define_study_step
 from elastocal.study.jobs import MICRO, Job, make_frame, read_frames, write_csvs
+from elastocal.study.metrics import find_kept_length
 from elastocal.study.schemas import BUDGET
 from elastocal.study.simulation import draw_bootstrap_weights, make_prefix_index
 from elastocal.study.strategies import Stage, Strategy
@@ -213,9 +214,7 @@ def build_lengths_table(
             cell = frame[frame.points == points]
             if cell.empty:
                 continue
-            curves = _pivot_squares(cell)
-            lengths = curves.columns.to_numpy()
-            squares = curves.to_numpy()
+            squares = _pivot_squares(cell).to_numpy()
             rms = np.sqrt(squares.mean(axis=0))
             std_error = squares.std(axis=0, ddof=1) / np.sqrt(len(squares)) / (2 * rms)
             bounds = {
@@ -225,7 +224,7 @@ def build_lengths_table(
             }
             for accuracy in accuracies_um:
                 needed = {
-                    name: _find_kept_length(lengths, MICRO * curve <= accuracy)
+                    name: float(find_kept_length(MICRO * curve, accuracy))
                     for name, curve in bounds.items()
                 }
                 head = {"robot": robot, "points": points, "accuracy_um": accuracy}
@@ -245,13 +244,6 @@ def _select_squares(
 def _pivot_squares(cell: pd.DataFrame) -> pd.DataFrame:
     """Mean squares of a set of points, a row for each data set."""
     return cell.pivot(index="data_set", columns="length", values="mean_square")
-
-
-def _find_kept_length(lengths: np.ndarray, reached: np.ndarray) -> float:
-    """Find the first length from which on the accuracy is always reached."""
-    missed = np.flatnonzero(~reached)
-    first = missed[-1] + 1 if len(missed) else 0
-    return float(lengths[first]) if first < len(lengths) else np.inf
 
 
 def interpolate_configurations(squares: np.ndarray, accuracy: float) -> np.ndarray:

@@ -185,7 +185,7 @@ def build_table3(
 
 @dataclass(frozen=True)
 class _Table4Score:
-    """A score of Table 4, and the length at which it reaches its limit.
+    """A score of Table 4, and the length from which on it stays within its limit.
 
     Attributes
     ----------
@@ -213,10 +213,10 @@ def build_table4(
     k_sigma_limit_percent: float,
     deviation_limit_um: float,
 ) -> pd.DataFrame:
-    """Table 4: scores of the strategies at one noise level and length, and the lengths at
-    which they reach a limit.
+    """Table 4: scores of the strategies at one noise level and length, and the lengths
+    from which on they stay within a limit.
 
-    A length that no data set reaches is infinite.
+    Infinite if the longest data set is not within the limit.
     """
     length = results.length
     scores = [
@@ -252,7 +252,7 @@ def build_table4(
 def _evaluate_score(
     score: _Table4Score, cell: pd.DataFrame, replicates: pd.DataFrame, length: int
 ) -> dict[str, float]:
-    """Value of one score and the length at which it reaches its limit, each with its
+    """Value of one score and the length from which on it stays within its limit, each with its
     standard error."""
     row = _get_row(cell, length)
     curves = replicates.pivot(
