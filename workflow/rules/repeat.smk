@@ -8,7 +8,7 @@ rule repeat_studies:
     output:
         repeated="results/studies/{robot}.parquet",
     params:
-        step="elastocal.study.evaluation.repeat_studies",
+        step="elastocal.study.repeated.repeat_studies",
         study=study_in_memory(),
         strategies=list(STUDY.strategies.values()),
         studies=config["evaluation"]["studies"],

@@ -16,22 +16,20 @@ import numpy as np
 
 from elastocal.io.storage import read_blocks, read_table, write_table
 from elastocal.study.equation_11 import identify_blocks, read_measured_blocks
-from elastocal.study.in_memory import load_study
 from elastocal.study.jobs import (
     MICRO,
     Job,
     add_slugs,
     collect_provenance,
     load_robot,
-    load_strategies,
     make_frame,
     write_csvs,
 )
 from elastocal.study.metrics import (
     ValidationSet,
-    compute_k_sigma,
     compute_mean_deviation,
     compute_relative_stiffness_error,
+    compute_scores,
     extrapolate_length,
     find_kept_length,
     make_validation_set,
@@ -59,8 +57,6 @@ if TYPE_CHECKING:
 
     from elastocal.io.storage import Columns
     from elastocal.mechanics.robot import Robot
-    from elastocal.study.in_memory import StudyInMemory
-    from elastocal.study.strategies import Strategy
 
 # Largest spread of an identified compliance, relative to its mean, at which the mean of
 # its inverse is trustworthy.
@@ -195,31 +191,6 @@ def _to_averaged_quantity(compliance: np.ndarray, method: str) -> np.ndarray:
     return compliance if method == "compliance" else 1.0 / compliance
 
 
-def compute_scores(
-    compliance: np.ndarray,
-    deviation: np.ndarray,
-    true_compliance: np.ndarray,
-    fixed_joints: Sequence[int],
-) -> dict[str, np.ndarray]:
-    """Compute the scores (..., lengths) of averaged models.
-
-    Parameters
-    ----------
-    compliance : (..., lengths, n) array
-    deviation : (..., lengths) array
-    true_compliance : (n,) array
-    fixed_joints
-        Joints that are fixed in the last stage.
-    """
-    return {
-        "k_sigma": compute_k_sigma(compliance, true_compliance),
-        "k_sigma_fixed_joints": compute_k_sigma(
-            compliance, true_compliance, list(fixed_joints)
-        ),
-        "deviation": deviation,
-    }
-
-
 def build_metrics_table(
     averages: Averages, true_compliance: np.ndarray, fixed_joints: Sequence[int]
 ) -> dict[str, np.ndarray]:
@@ -290,66 +261,6 @@ def find_length_with_error(
     length = float(find_kept_length(values, limit))
     replicate_lengths = extrapolate_length(replicate_values, limit)
     return length, float(np.std(replicate_lengths, ddof=1))
-
-
-def evaluate_studies(
-    study: StudyInMemory, numbers: Iterable[int], strategies: Sequence[Strategy]
-) -> Iterator[dict[str, np.ndarray | str]]:
-    """Score strategies in the studies of these numbers; yields columns of the table of
-    repeated studies, for one strategy in one study after the other."""
-    for number in numbers:
-        validation = study.make_validation_set(number)
-        estimates = study.estimate_all(strategies, number)
-        for strategy in strategies:
-            blocks = estimates[strategy.name]
-            columns = _score_study(study, strategy, blocks, validation)
-            lengths = len(columns["mean_square"])
-            yield {
-                "length": np.arange(1, lengths + 1),
-                "study": np.full(lengths, number),
-                "strategy": strategy.name,
-                **columns,
-            }
-
-
-def _score_study(
-    study: StudyInMemory,
-    strategy: Strategy,
-    blocks: Sequence[np.ndarray],
-    validation: ValidationSet,
-) -> dict[str, np.ndarray]:
-    """Compliances and scores (lengths,) of one study.
-
-    `blocks` are compliances (sets, lengths, n) by one strategy.
-    """
-    tests = np.ones((1, study.size.tests))
-    weighted = [(block, np.ones((1, len(block)))) for block in blocks]
-
-    def average(method: str) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        averages = average_estimates(weighted, validation, method, tests)
-        compliance = averages.compliance[0]
-        scores = compute_scores(
-            compliance,
-            averages.deviation[0],
-            study.robot.compliance,
-            strategy.fixed_joints,
-        )
-        return compliance, scores
-
-    compliance, scores = average(study.interpretation.average)
-    _, compliance_scores = average("compliance")
-    squares = [
-        validation.compute_mean_square(np.moveaxis(block, 0, -1)) for block in blocks
-    ]
-    return {
-        **{f"compliance_{j}": column for j, column in enumerate(compliance.T, 1)},
-        **scores,
-        **{
-            f"{name}_mean_compliance": values
-            for name, values in compliance_scores.items()
-        },
-        "mean_square": np.concatenate(squares, axis=1).mean(axis=1),
-    }
 
 
 def build_over_studies_table(
@@ -474,16 +385,6 @@ def _read_estimates(job: Job, joints: int) -> Iterator[np.ndarray]:
     for block in read_blocks(job.output.identified, schema, ["data_set", *names]):
         sets = len(list_data_sets(block))
         yield np.stack([block[name].reshape(sets, -1) for name in names], axis=-1)
-
-
-def repeat_studies(job: Job) -> None:
-    """Evaluate further studies of one robot."""
-    study = load_study(job)
-    blocks = evaluate_studies(
-        study, range(1, job.params.studies + 1), load_strategies(job)
-    )
-    schema = REPEATED.for_joints(study.robot.joints)
-    write_table(job.output.repeated, schema, blocks, collect_provenance(job))
 
 
 def tabulate_studies(job: Job) -> None:

@@ -172,6 +172,31 @@ def compute_k_sigma(
     return errors[..., joints].sum(axis=-1)
 
 
+def compute_scores(
+    compliance: np.ndarray,
+    deviation: np.ndarray,
+    true_compliance: np.ndarray,
+    fixed_joints: Sequence[int],
+) -> dict[str, np.ndarray]:
+    """Compute the scores (..., lengths) of averaged models.
+
+    Parameters
+    ----------
+    compliance : (..., lengths, n) array
+    deviation : (..., lengths) array
+    true_compliance : (n,) array
+    fixed_joints
+        Joints that are fixed in the last stage.
+    """
+    return {
+        "k_sigma": compute_k_sigma(compliance, true_compliance),
+        "k_sigma_fixed_joints": compute_k_sigma(
+            compliance, true_compliance, list(fixed_joints)
+        ),
+        "deviation": deviation,
+    }
+
+
 def find_kept_length(values: np.ndarray, limit: float) -> np.ndarray:
     """Find the first data set length from which on a metric stays within `limit` in
     absolute value.
