@@ -8,6 +8,8 @@ from drawn_figures import assert_nothing_cut_off, legend_entries, row_labels
 from matplotlib.colors import to_hex
 
 from elastocal.figures.study import (
+    draw_deviations,
+    draw_multiverse,
     draw_noise_impact,
     draw_scores,
     draw_stiffness_errors,
@@ -40,7 +42,7 @@ METRICS = pd.concat(
         for n, name in enumerate(ORDER, 1)
     ]
 )
-PAPER = "the paper's Table 4"
+PAPER = "the paper's Table 4,\nside by side at one length"
 PRINTED = pd.DataFrame(
     [
         ("4", "kuka", "2DoF+6DoF", "k_sigma_4", 2.2),
@@ -123,16 +125,40 @@ def test_stiffness_errors_have_a_panel_for_each_count_of_joints_with_their_limit
     assert all_joints.get_ylabel() == r"$k_\Sigma$ (%)"
     assert legend_entries(figure) == [*ORDER, PAPER]
     assert_nothing_cut_off(figure)
-    # The paper's marks belong to the fixed joints: its score at 4 configurations, and the
-    # length at which it reaches 3 %.
-    marks = [line for line in fixed_joints.lines if line.get_marker() == "D"]
-    assert len(all_joints.lines) == 3 and [
-        line.get_xydata().tolist() for line in marks
-    ] == [
-        [[4, 2.2]],
-        [[5, 3]],
-    ]
-    assert marks[0].get_color() == fixed_joints.lines[1].get_color()
+    # The paper's score at 4 configurations, and the length from which on it is within 3 %,
+    # stand beside the curves of either count of joints.
+    for axis in (all_joints, fixed_joints):
+        marks = find_diamonds(axis)
+        assert [line.get_xydata().tolist() for line in marks] == [[[4, 2.2]], [[5, 3]]]
+        assert marks[0].get_color() == axis.lines[1].get_color()
+
+
+def find_diamonds(axis):
+    """Diamonds that are at a point, without the one of the legend."""
+    lines = [line for line in axis.lines if line.get_marker() == "D"]
+    return [line for line in lines if len(line.get_xdata())]
+
+
+def test_names_of_one_estimator_share_a_line_and_printed_scores_stand_side_by_side():
+    names = ["6DoF", "6DoF after 3DoF", "comb"]
+    metrics = pd.concat(
+        [
+            metrics_of("kuka", name, size)
+            for name, size in zip(names, (100.0, 100.0, 50.0), strict=True)
+        ]
+    )
+    printed = pd.DataFrame(
+        [("4", "kuka", name, "dev_4", 20.0) for name in names],
+        columns=["table", "robot", "strategy", "quantity", "value"],
+    )
+    figure = draw_deviations(metrics, printed, "Kuka", "kuka", names, 2.0)
+    (axis,) = figure.axes
+    assert legend_entries(figure) == ["6DoF,\n6DoF after 3DoF", "comb", PAPER]
+    marks = find_diamonds(axis)
+    positions = [float(line.get_xdata()[0]) for line in marks]
+    assert np.diff(positions).min() > 1
+    assert np.mean(positions) == pytest.approx(4.0)
+    assert marks[0].get_color() == marks[1].get_color() != marks[2].get_color()
 
 
 def find_points(axis, marker):
@@ -147,22 +173,60 @@ def find_points(axis, marker):
 
 
 def test_each_printed_figure_of_table_4_is_drawn_with_the_studies_of_its_robot():
-    columns = ["robot", "quantity", "paper", "studies_mean", "studies_std", "p_holm"]
+    columns = ["robot", "quantity", "paper", "studies_median", "p_corrected"]
     rows = [
-        ("kuka", "k_sigma_20", 1.5, 1.75, 0.1, 0.002),
-        ("kuka", "dev_20", 1.0, 1.2, 0.08, 0.16),
+        ("kuka", "k_sigma_20", 1.5, 1.75, 0.002),
+        ("kuka", "dev_20", 1.0, 1.2, 0.16),
     ]
     table = pd.DataFrame(
-        [*rows, ("fanuc", "n_dev_2_um", 30.0, 110.0, 40.0, 0.18)], columns=columns
+        [*rows, ("fanuc", "n_dev_2_um", 30.0, 110.0, 0.18)], columns=columns
+    )
+    median = table.studies_median
+    table = table.assign(
+        studies_low=0.9 * median,
+        studies_high=1.2 * median,
+        unseen_low=0.8 * median,
+        unseen_high=1.5 * median,
     )
     figure = draw_scores(table.assign(table="4", strategy="6DoF"), TITLES)
     heads = [axis.get_title() for axis in figure.axes[:3]]
-    assert heads == ["$k_\\Sigma$ at 20 (%)", "dev at 20 (µm)", "length until 2 µm"]
+    assert heads == [
+        "$k_\\Sigma$ at 20 (%)",
+        "dev at 20 (µm)",
+        "configurations\nfor 2 µm",
+    ]
     assert row_labels(figure.axes[0]) == ["6DoF"]
     k_sigma, dev, _ = figure.axes[:3]
-    # After Holm's correction the first differs and the second does not.
+    # After the correction the first differs and the second does not.
     assert find_points(k_sigma, "D") == [(1.5, 0.0, True)] and find_points(
         dev, "D"
     ) == [(1.0, 0.0, False)]
-    assert [x for x, *_ in find_points(dev, "o")] == [1.2]
+    # The median with the narrow and the wide range.
+    assert [x for x, *_ in find_points(dev, "o")] == [1.2, 1.2]
     assert find_points(figure.axes[5], "D") == [(30.0, 0.0, False)]
+
+
+def test_each_interpretation_has_the_median_factor_between_the_paper_and_both_readings():
+    columns = [
+        *("interpretation", "table", "quantity"),
+        *("paper", "ours", "other", "change_percent"),
+    ]
+    rows = [
+        ("R10", "4", "k_sigma_20", 1.0, 1.1, 2.2, 100.0),
+        ("R10", "4", "k_sigma_20", 2.0, 1.0, 8.0, 700.0),
+        ("R3", "4", "k_sigma_20", 1.0, 1.0, 1.0, 0.0),
+        ("R3", "2", "deviation_mean", 1.0, 0.8, 1.6, 100.0),
+    ]
+    figure = draw_multiverse(pd.DataFrame(rows, columns=columns))
+    k_sigma, table2 = figure.axes
+    assert [axis.get_title() for axis in figure.axes] == [
+        "$k_\\Sigma$ at 20 (%)",
+        "Table 2",
+    ]
+    assert row_labels(k_sigma) == ["R3", "R10"]
+    ours, other = k_sigma.lines[:2]
+    # Medians of logarithms: of 1.1 and 2, and of 2.2 and 4.
+    np.testing.assert_allclose(ours.get_xdata(), [1.0, np.sqrt(2.2)])
+    np.testing.assert_allclose(other.get_xdata(), [1.0, np.sqrt(8.8)])
+    np.testing.assert_allclose(table2.lines[1].get_xdata(), [1.6, np.nan])
+    assert_nothing_cut_off(figure)

@@ -277,21 +277,55 @@ def strategy_document(wildcards):
     return STUDY.strategies[wildcards.strategy]
 
 
-def study_in_memory(**size):
+def study_in_memory(interpretations=INTERPRETATIONS, robot=robot_document, **size):
     """Return what a step draws the data sets of a robot from: robot, seed, interpretation of the paper, and size of the study."""
     interpretation = {
-        "wrench_at": INTERPRETATIONS["wrench_at"],
-        "average": INTERPRETATIONS["average"],
-        "rows": count_components(INTERPRETATIONS["measured"]),
+        "wrench_at": interpretations["wrench_at"],
+        "average": interpretations["average"],
+        "rows": count_components(interpretations["measured"]),
+    }
+    loading = config["loading"] | {
+        key: interpretations[key] for key in ("offset_frame", "joint_range")
     }
     return lambda wildcards: {
-        "robot": robot_document(wildcards),
+        "robot": robot(wildcards),
         "seed": config["seed"],
-        "tool_offset_m": INTERPRETATIONS["tool_offset_m"],
-        "loading": LOADING,
+        "tool_offset_m": interpretations["tool_offset_m"],
+        "loading": loading,
         "interpretation": interpretation,
         "size": STUDY_SIZE | size,
     }
+
+
+ALTERNATIVES = config["evaluation"]["alternatives"]
+# Robots that an interpretation the other way changes.
+ALTERNATIVE_ROBOTS = {number: REDUCED for number in ALTERNATIVES["interpretations"]}
+ALTERNATIVE_ROBOTS |= {
+    number: [robot for robot in REDUCED if robot in robots]
+    for number, robots in ALTERNATIVES["lengths_m"].items()
+    if {*robots} & {*REDUCED}
+}
+
+
+def robot_of_alternative(wildcards):
+    """Return the document of a robot with the lengths of an interpretation the other way."""
+    document = robot_document(wildcards)
+    robots = ALTERNATIVES["lengths_m"].get(wildcards.number, {})
+    return document | {"lengths_m": document["lengths_m"] | robots.get(wildcards.robot, {})}
+
+
+def alternative_study(wildcards):
+    """Return the study of a robot under an interpretation the other way."""
+    changes = ALTERNATIVES["interpretations"].get(wildcards.number, {})
+    return study_in_memory(INTERPRETATIONS | changes, robot_of_alternative)(wildcards)
+
+
+def alternative_files(suffix):
+    return [
+        f"results/alternatives/{number}/{robot}{suffix}.parquet"
+        for number, robots in ALTERNATIVE_ROBOTS.items()
+        for robot in robots
+    ]
 
 
 def cells(kind, robots, noise, strategies=config["strategies"]):

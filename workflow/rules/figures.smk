@@ -18,7 +18,7 @@ PAPER_FIGURES = [
     *(f"figure5{panel}" for panel in STIFFNESS_PANELS),
     *(f"figure5{panel}" for panel in DEVIATION_PANELS),
 ]
-FIGURES = [*PAPER_FIGURES, "scores_against_paper", "ladder", "designs"]
+FIGURES = [*PAPER_FIGURES, "scores_against_paper", "multiverse", "ladder", "designs"]
 
 
 rule draw_scheme:
@@ -118,6 +118,25 @@ rule draw_scores:
         figure="draw_scores",
         tables=["comparison"],
         settings={"titles": REDUCED_TITLES},
+    script:
+        "../scripts/draw_study.py"
+
+
+rule draw_multiverse:
+    input:
+        table=rules.tabulate_multiverse.output.table,
+    output:
+        pdf="reports/figures/multiverse.pdf",
+        png=shown_figure(
+            "reports/figures/multiverse.png",
+            "multiverse_figure",
+            PAPER,
+            "Interpretations the other way",
+        ),
+    params:
+        figure="draw_multiverse",
+        tables=["table"],
+        settings={},
     script:
         "../scripts/draw_study.py"
 

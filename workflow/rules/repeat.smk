@@ -1,6 +1,7 @@
-"""Repeated studies: how much studies of the same size differ, and Table 4 over all of them.
+"""Repeated studies: how much studies of the same size differ, Table 4 over all of them, and studies under other interpretations.
 
-Needs only the configuration. Writes results/studies/{robot}.parquet and reports/tables/strategies_over_studies.csv.
+Needs only the configuration. Writes results/studies/{robot}.parquet, results/alternatives/{number}/{robot}.parquet with
+{robot}_initial.parquet, and reports/tables/strategies_over_studies.csv.
 """
 
 
@@ -34,5 +35,21 @@ rule tabulate_studies:
             "k_sigma": config["tables"]["k_sigma_limit_percent"],
             "deviation": config["tables"]["deviation_limit_um"],
         },
+    script:
+        "../scripts/run_step.py"
+
+
+rule evaluate_alternative:
+    output:
+        repeated="results/alternatives/{number}/{robot}.parquet",
+        initial="results/alternatives/{number}/{robot}_initial.parquet",
+    wildcard_constraints:
+        number=r"R\d+",
+        robot="|".join(map(re.escape, REDUCED)),
+    params:
+        step="elastocal.study.multiverse.evaluate_alternative",
+        study=alternative_study,
+        strategies=list(STUDY.strategies.values()),
+        studies=ALTERNATIVES["studies"],
     script:
         "../scripts/run_step.py"

@@ -15,6 +15,7 @@ STATED = {
 rule compile_paper:
     input:
         beside=rules.compare_with_paper.output.table,
+        table2=rules.tabulate_initial.output.table,
         figures=expand("reports/figures/{figure}.pdf", figure=PAPER_FIGURES),
         citation=placed(ROOT / "CITATION.cff"),
         pages=placed(PACKAGES / "elastocal" / "report" / "paper.typ"),
@@ -28,6 +29,7 @@ rule compile_paper:
         ),
     params:
         names=TITLES,
+        robots=REDUCED,
         stated={
             "classical": NAMES[CLASSICAL],
             **{key: str(config["tables"][key]) for key in ("noise_um", "length")},
@@ -53,6 +55,8 @@ rule state_answers:
         extended=rules.tabulate_extended.output.table,
         studies=rules.tabulate_studies.output.table,
         joint=rules.compare_with_studies.output.joint,
+        multiverse_summary=rules.tabulate_multiverse.output.summary,
+        claims=rules.judge_claims.output.table,
         break_even=rules.tabulate_costs.output.table,
         simulated=rules.tabulate_simulated_designs.output.table,
         citation=placed(ROOT / "CITATION.cff"),
@@ -94,7 +98,6 @@ rule compile_report:
         table2=rules.tabulate_initial.output.table,
         table3=rules.tabulate_identified.output.table,
         table4=rules.tabulate_strategies.output.table,
-        interpretations=f"{CONFIG}/paper/interpretations.csv",
         figures=expand("reports/figures/{figure}.pdf", figure=FIGURES),
         bibliography=placed(ROOT / "paper" / "paper.bib"),
         pages=placed(PACKAGES / "elastocal" / "report" / "study.typ"),

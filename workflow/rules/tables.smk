@@ -135,8 +135,55 @@ rule compare_with_studies:
         ),
         joint="reports/tables/joint_test.csv",
     params:
-        step="elastocal.study.printed.compare_with_studies",
+        step="elastocal.study.joint_test.compare_with_studies",
         robots=config["robots"],
+        length=config["tables"]["length"],
+    script:
+        "../scripts/run_step.py"
+
+
+rule tabulate_multiverse:
+    input:
+        alternatives=alternative_files(""),
+        alternatives_initial=alternative_files("_initial"),
+        studies=expand(rules.repeat_studies.output.repeated, robot=REDUCED),
+        initial=expand(rules.summarize_initial.output.initial, robot=config["robots"]),
+        reference=PRINTED_FIGURES,
+        interpretations=f"{CONFIG}/paper/interpretations.csv",
+    output:
+        table=shown_table(
+            "reports/tables/multiverse.csv",
+            "multiverse",
+            PAPER,
+            "Every printed figure with each interpretation the other way",
+        ),
+        summary="reports/tables/multiverse_summary.csv",
+    params:
+        step="elastocal.study.multiverse.tabulate_multiverse",
+        robots=config["robots"],
+        alternatives=ALTERNATIVE_ROBOTS,
+        length=config["tables"]["length"],
+    script:
+        "../scripts/run_step.py"
+
+
+rule judge_claims:
+    input:
+        claims=f"{CONFIG}/paper/claims.csv",
+        studies=expand(rules.repeat_studies.output.repeated, robot=REDUCED),
+        table2=rules.tabulate_initial.output.table,
+        extended=rules.tabulate_extended.output.table,
+        scores=rules.tabulate_uses.output.scores,
+        score_pairs=rules.tabulate_uses.output.pairs,
+        budget=rules.tabulate_budget.output.budget,
+        pairs=rules.tabulate_budget.output.pairs,
+        simulated=rules.tabulate_simulated_designs.output.table,
+    output:
+        table=shown_table(
+            "reports/tables/claims.csv", "claims", PAPER, "The paper's sentences, one by one"
+        ),
+    params:
+        step="elastocal.study.claims.judge_claims",
         length=config["tables"]["length"],
     script:
         "../scripts/run_step.py"

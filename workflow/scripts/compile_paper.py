@@ -5,7 +5,11 @@ from job import Job, origin_of, run
 import pandas as pd
 
 from elastocal.io.documents import read_document
-from elastocal.report.study import format_paper_rows, shorten_titles
+from elastocal.report.study import (
+    format_paper_rows,
+    format_pooled_deflections,
+    shorten_titles,
+)
 from elastocal.report.typesetting import compile_document
 
 
@@ -14,12 +18,17 @@ def compile_paper(job: Job) -> None:
     authors = [
         author["name"] for author in read_document(job.input.citation)["authors"]
     ]
-    rows = format_paper_rows(
-        comparison,
-        shorten_titles(job.params.names),
-        int(job.params.stated["configurations"]),
-    )
-    facts = job.params.stated | {"rows": rows, "authors": authors}
+    names = shorten_titles(job.params.names)
+    configurations = int(job.params.stated["configurations"])
+    rows = format_paper_rows(comparison, names, configurations)
+    facts = job.params.stated | {
+        "rows": rows,
+        "authors": authors,
+        "titles": [names[robot] for robot in job.params.robots],
+        "table2_pooled": format_pooled_deflections(
+            pd.read_csv(job.input.table2), names
+        ),
+    }
     compile_document(
         job.output.report,
         "paper.typ",

@@ -8,7 +8,7 @@ from elastocal.io.json_files import read_json
 from elastocal.report.study import format_paper_tables
 from elastocal.report.typesetting import compile_document
 
-TABLES = ("table1", "table2", "table3", "table4", "interpretations")
+TABLES = ("table1", "table2", "table3", "table4")
 
 
 def compile_report(job: Job) -> None:

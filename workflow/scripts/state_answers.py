@@ -23,6 +23,8 @@ TABLES = (
     "scores",
     "score_pairs",
     "comparison",
+    "multiverse_summary",
+    "claims",
     "ladder",
     "simulated",
 )

@@ -26,21 +26,23 @@ from elastocal.figures.style import (
     label_decades,
     styled,
 )
-from elastocal.study.printed import SIGNIFICANCE_LEVEL
+from elastocal.study.joint_test import SIGNIFICANCE_LEVEL
 
 # Range of the linear panels of the noise impact: readers compare it with the accuracy
 # that they want.
 _LINEAR_RANGE_UM = 20.0
 _LENGTH_LABEL = "configurations in the data set"
 _BANDS_TITLE = (
-    "bands: ± one Monte Carlo standard error; "
-    "one estimator under several names is drawn once"
+    "bands: ± one Monte Carlo standard error; names of one estimator share a line"
 )
+_PRINTED_LABEL = "the paper's Table 4,\nside by side at one length"
+# Configurations between the printed scores at one length, so that none hides another.
+_SPREAD = 1.6
 _QUANTITY_TITLES = {
     "k_sigma_20": "$k_\\Sigma$ at 20 (%)",
-    "n_k_sigma_1_percent": "length until 1 %",
+    "n_k_sigma_1_percent": "configurations\nfor 1 %",
     "dev_20": "dev at 20 (µm)",
-    "n_dev_2_um": "length until 2 µm",
+    "n_dev_2_um": "configurations\nfor 2 µm",
 }
 _DESIGN_LABELS = {
     "random": "random",
@@ -48,6 +50,8 @@ _DESIGN_LABELS = {
     "D": "D-optimal",
     "I": "I-optimal",
 }
+_STUDIES_LABEL = "further studies, median and central 95 %"
+_UNSEEN_LABEL = "values that would not differ in the test of all figures"
 _DIAMOND: dict[str, Any] = {
     "marker": "D",
     "linestyle": "",
@@ -79,58 +83,82 @@ class _StrategyCurves:
 
     def draw_lines(self, axis: Axes, quantity: str, scale: float = 1.0) -> None:
         """Draw a scaled column of the metrics for each different estimator, at the
-        lengths at which the mean of 1/c exists in practice."""
-        trusted = self.metrics[
-            (self.metrics.robot == self.robot) & self.metrics.trustworthy
-        ]
-        curves = trusted.pivot(index="length", columns="strategy", values=quantity)
-        for index in _find_distinct_curves(curves, self.order):
+        lengths at which the mean of 1/c exists in practice; a label has all names of the
+        estimator."""
+        trusted = self._select_trusted()
+        for index, names in self._group_names(quantity).items():
             cell = trusted[trusted.strategy == self.order[index]]
             style = choose_line_style(index)
             value = scale * cell[quantity]
             error = scale * cell[f"{quantity}_std_error"]
-            axis.plot(cell.length, value, label=self.order[index], **style)
+            axis.plot(cell.length, value, label=",\n".join(names), **style)
             _fill_band(axis, cell.length, value - error, value + error, style["color"])
         axis.set_xlim(2, 1.02 * self.metrics.length.max())
 
-    def draw_printed_marks(self, axis: Axes, quantity: str) -> None:
-        """Draw the printed scores at a length, and the printed lengths at which scores
-        reach a limit."""
-        label = "the paper's Table 4"
-        printed = self.printed[
+    def draw_printed_marks(self, axis: Axes, printed: str, quantity: str) -> None:
+        """Draw the printed scores at a length, side by side, and the printed lengths at
+        which scores reach a limit.
+
+        `printed` is the printed score that the column `quantity` of the metrics is.
+        """
+        rows = self.printed[
             (self.printed.table == "4")
             & (self.printed.robot == self.robot)
             & self.printed.strategy.isin(self.order)
         ]
-        for row in printed.itertuples():
-            position = _locate_printed_mark(quantity, str(row.quantity), row.value)
+        groups = self._group_names(quantity)
+        positions = [
+            (_locate_printed_mark(printed, str(row.quantity), row.value), row.strategy)
+            for row in rows.itertuples()
+        ]
+        is_score = rows.quantity.str.startswith(printed).to_numpy()
+        sideways = np.where(is_score, _SPREAD * (np.cumsum(is_score) - 1), 0.0)
+        sideways[is_score] -= sideways[is_score].mean() if is_score.any() else 0.0
+        for (position, strategy), shift in zip(positions, sideways, strict=True):
             if position is None:
                 continue
-            style = choose_line_style(self.order.index(str(row.strategy)))
-            axis.plot(
-                *position, color=style["color"], zorder=4, label=label, **_DIAMOND
-            )
-            # A label with an underscore stays out of the legend.
-            label = "_same"
+            first = next(i for i, names in groups.items() if strategy in names)
+            color = choose_line_style(first)["color"]
+            x, y = position
+            axis.plot(x + shift, y, color=color, zorder=4, **_DIAMOND)
+        if len(rows):
+            axis.plot([], [], color="#bdbdbd", label=_PRINTED_LABEL, **_DIAMOND)
+
+    def _select_trusted(self) -> pd.DataFrame:
+        return self.metrics[
+            (self.metrics.robot == self.robot) & self.metrics.trustworthy
+        ]
+
+    def _group_names(self, quantity: str) -> dict[int, list[str]]:
+        """Names of each different estimator by the position of the first of them."""
+        curves = self._select_trusted().pivot(
+            index="length", columns="strategy", values=quantity
+        )
+        return _group_equal_curves(curves, self.order)
 
 
-def _find_distinct_curves(curves: pd.DataFrame, order: Sequence[str]) -> list[int]:
-    """Indices of the strategies whose curve equals no earlier one, up to rounding.
+def _group_equal_curves(
+    curves: pd.DataFrame, order: Sequence[str]
+) -> dict[int, list[str]]:
+    """Names of strategies with the same curve, up to rounding, by the position of the
+    first of them.
 
     `curves` has a column for each strategy.
     """
-    distinct: list[int] = []
+    groups: dict[int, list[str]] = {}
     for index, name in enumerate(order):
         if name not in curves:
             continue
-        earlier = (curves[order[previous]] for previous in distinct)
-        equal = (
-            np.allclose(curves[name], curve, rtol=1e-6, atol=0, equal_nan=True)
-            for curve in earlier
-        )
-        if not any(equal):
-            distinct.append(index)
-    return distinct
+        for first, names in groups.items():
+            first_curve = curves[order[first]]
+            if np.allclose(
+                curves[name], first_curve, rtol=1e-6, atol=0, equal_nan=True
+            ):
+                names.append(name)
+                break
+        else:
+            groups[index] = [name]
+    return groups
 
 
 def _locate_printed_mark(
@@ -195,7 +223,7 @@ def draw_noise_impact(
     axes[0, 0].set_ylabel("dev, equation 15 (µm)")
     axes[1, 0].set_ylabel("the same, linear (µm)")
     legend_title = (
-        "noise (µm and µrad); bands: a standard error as a factor; "
+        "noise (µm and µrad); bands: one standard error, as a factor; "
         "thin: some ĉ ≤ 0, or ĉ scatters by over a quarter"
     )
     add_legend_below(figure, 5, legend_title)
@@ -234,14 +262,14 @@ def draw_stiffness_errors(
     Parameters
     ----------
     metrics, printed, robot, order
-        As in `_StrategyCurves`. The printed figures of k_sigma are taken to count the
-        joints fixed in the last stage.
+        As in `_StrategyCurves`. Both panels have the printed figures of k_sigma, because
+        the paper does not say which joints it counts.
     title : str
         Name of the robot.
     limit_percent : float
         Marked by a line.
     """
-    figure, axes = create_panels(1, 2, 96, sharey=True)
+    figure, axes = create_panels(1, 2, 112, sharey=True)
     curves = _StrategyCurves(metrics, printed, robot, order)
     panel_titles = {
         "k_sigma": "all joints (equation 14)",
@@ -253,11 +281,11 @@ def draw_stiffness_errors(
         curves.draw_lines(axis, quantity)
         _draw_limit(axis, limit_percent, "%")
         axis.set(title=panel_title, xlabel=_LENGTH_LABEL)
-    curves.draw_printed_marks(axes[0, 1], "k_sigma")
+        curves.draw_printed_marks(axis, "k_sigma", quantity)
     figure.suptitle(title, fontsize=9)
     axes[0, 0].set(ylabel=r"$k_\Sigma$ (%)", yscale="log", ylim=(0.3, 40))
     label_decades(axes[0, 0].yaxis)
-    add_legend_below(figure, 4, _BANDS_TITLE)
+    add_legend_below(figure, 3, _BANDS_TITLE)
     return figure
 
 
@@ -275,12 +303,12 @@ def draw_deviations(
 
     Parameters are as in `draw_stiffness_errors`; `limit_um` is marked by a line.
     """
-    figure, axes = create_panels(1, 1, 92)
+    figure, axes = create_panels(1, 1, 108)
     axis = axes[0, 0]
     curves = _StrategyCurves(metrics, printed, robot, order)
     curves.draw_lines(axis, "deviation", MICRO)
     _draw_limit(axis, limit_um, "µm")
-    curves.draw_printed_marks(axis, "dev")
+    curves.draw_printed_marks(axis, "dev", "deviation")
     axis.set(
         title=title,
         xlabel=_LENGTH_LABEL,
@@ -289,7 +317,7 @@ def draw_deviations(
         ylim=(0.5, 80),
     )
     label_decades(axis.yaxis)
-    add_legend_below(figure, 4, _BANDS_TITLE)
+    add_legend_below(figure, 3, _BANDS_TITLE)
     return figure
 
 
@@ -304,7 +332,7 @@ def draw_scores(comparison: pd.DataFrame, titles: Mapping[str, str]) -> Figure:
     titles
         Name of each robot to draw, by its key.
     """
-    shown = comparison[(comparison.table == "4") & comparison.studies_mean.notna()]
+    shown = comparison[(comparison.table == "4") & comparison.studies_median.notna()]
     if shown.empty:
         return draw_note("the paper prints nothing of the robots of this study")
     quantities = list(dict.fromkeys(shown.quantity))
@@ -329,26 +357,76 @@ def draw_scores(comparison: pd.DataFrame, titles: Mapping[str, str]) -> Figure:
 
 
 def _draw_scatter(axis: Axes, cells: pd.DataFrame, rows: np.ndarray) -> None:
-    """Draw the range of the studies and the printed value of each cell in its row."""
-    axis.errorbar(
-        cells.studies_mean,
-        rows,
-        xerr=2 * cells.studies_std,
-        fmt="o",
-        label="further studies, mean ± 2 standard deviations",
-        color=PALETTE[0],
-        markersize=3,
-        elinewidth=3,
-        alpha=0.6,
-    )
-    differs = (cells.p_holm < SIGNIFICANCE_LEVEL).to_numpy()
+    """Draw the range of the studies, the values that would not differ in the test of all
+    figures, and the printed value of each cell in its row."""
+    median = cells.studies_median
+    for low, high, width, alpha, label in (
+        (cells.unseen_low, cells.unseen_high, 1, 0.5, _UNSEEN_LABEL),
+        (cells.studies_low, cells.studies_high, 4, 0.6, _STUDIES_LABEL),
+    ):
+        axis.errorbar(
+            median,
+            rows,
+            xerr=[median - low, high - median],
+            fmt="o",
+            label=label,
+            color=PALETTE[0],
+            markersize=3,
+            elinewidth=width,
+            alpha=alpha,
+        )
+    differs = (cells.p_corrected < SIGNIFICANCE_LEVEL).to_numpy()
     for selected, color, label in (
-        (~differs, "white", "paper"),
-        (differs, PALETTE[1], "paper, differs (Holm)"),
+        (~differs, "#bdbdbd", "paper, does not differ"),
+        (differs, PALETTE[1], "paper, differs"),
     ):
         axis.plot(
             cells.paper[selected], rows[selected], color=color, label=label, **_DIAMOND
         )
+
+
+@styled
+def draw_multiverse(table: pd.DataFrame) -> Figure:
+    """Draw how far the printed figures lie from ours and from those of each
+    interpretation the other way, by the quantity.
+
+    Parameters
+    ----------
+    table
+        From `study.multiverse.build_multiverse_table`.
+    """
+    if table.empty:
+        return draw_note("the paper prints nothing of the robots of this study")
+    numbers = sorted(set(table.interpretation), key=lambda number: int(number[1:]))
+    groups = table.quantity.map(_QUANTITY_TITLES)
+    groups = groups.where(table.table == "4", "Table " + table.table)
+    titles = list(dict.fromkeys(groups))
+    figure, axes = create_panels(1, len(titles), 26 + 6 * len(numbers), sharey=True)
+    for axis, title in zip(axes[0], titles, strict=True):
+        cells = table[groups == title].groupby("interpretation")
+        factors = pd.DataFrame(
+            {name: _find_median_factor(cells, name) for name in ("ours", "other")}
+        ).reindex(numbers)
+        rows = range(len(numbers))
+        axis.hlines(rows, factors.ours, factors.other, color="#9a9a9a", linewidth=0.8)
+        axis.plot(factors.ours, rows, "o", color=PALETTE[0], label="as we read it")
+        axis.plot(factors.other, rows, "D", color=PALETTE[1], label="the other way")
+        axis.set(title=title, xscale="log", ylim=(len(numbers) - 0.5, -0.5))
+        axis.set_xlim(0.95, max(3.0, 1.1 * float(np.nanmax(factors.to_numpy()))))
+        label_decades(axis.xaxis)
+        axis.grid(visible=False, axis="y")
+    axes[0, 0].set_yticks(range(len(numbers)), labels=numbers)
+    add_legend_below(
+        figure, 2, "factor between the printed figures and those of the study, median"
+    )
+    return figure
+
+
+def _find_median_factor(cells: Any, name: str) -> pd.Series:
+    """Median factor, at least 1, between a column and the paper in each group."""
+    return cells.apply(
+        lambda cell: np.exp(np.log(cell[name] / cell.paper).abs().median())
+    )
 
 
 @styled

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 
 from elastocal.report.typesetting import render_sentences
+from elastocal.study.joint_test import SIGNIFICANCE_LEVEL
 from elastocal.study.ladder import CHOSEN
-from elastocal.study.printed import SIGNIFICANCE_LEVEL
 from elastocal.study.tables import (
     format_column_head,
     format_value,
@@ -160,8 +160,10 @@ def collect_study_facts(
         "accuracy_um": f"{settings['accuracy_um']:g}",
         "stated": stated,
         "cells": str(len(judged)),
-        "differ": str(int((judged.p_holm < SIGNIFICANCE_LEVEL).sum())),
+        "differ": str(int((judged.p_corrected < SIGNIFICANCE_LEVEL).sum())),
         "studies": str(int(frames["joint"].studies.max())),
+        "rejected": _is_rejected(frames["joint"]),
+        "estimators_count": str(_count_estimators(frames["scores"])),
         "extended": extended.to_numpy().tolist(),
         "strategies": list(map(_describe_strategy, settings["strategies"])),
     }
@@ -173,7 +175,7 @@ def _prepare_frames(
     """Name the robots in the tables, and add the selections that the report shows."""
     frames = {name: _name_robots(frame, names) for name, frame in tables.items()}
     comparison = frames["comparison"]
-    judged = comparison[comparison.p_holm.notna()]
+    judged = comparison[comparison.p_corrected.notna()]
     pairs = frames["score_pairs"]
     turned = pairs[pairs.reversed & (pairs.metric != REFERENCE)]
     size = (turned.ratio / turned.rms_ratio).abs()
@@ -182,10 +184,46 @@ def _prepare_frames(
         frames[name] = frame[frame.accuracy_um == accuracy_um]
     return frames | {
         "judged": judged,
-        "outside": judged[judged.p_value < SIGNIFICANCE_LEVEL],
+        "outside": judged[judged.p_value < SIGNIFICANCE_LEVEL].sort_values(
+            "p_corrected"
+        ),
+        "detectable": _summarize_detectable(judged),
         "printed": comparison[comparison.table == "2"],
         "turned": turned.assign(size=size),
     }
+
+
+def _is_rejected(joint: pd.DataFrame) -> str:
+    """Whether either joint test over the joints fixed in the last stage rejects."""
+    first = joint.iloc[0]
+    p_values = first[["largest_distance_p", "below_p"]].astype(float)
+    return "yes" if (p_values < SIGNIFICANCE_LEVEL).any() else "no"
+
+
+def _count_estimators(scores: pd.DataFrame) -> int:
+    """Number of different estimators: strategies with different errors of one data set on
+    the first robot."""
+    rows = scores[(scores.robot == scores.robot.iloc[0]) & (scores.metric == REFERENCE)]
+    return len({f"{value:.6g}" for value in rows.value})
+
+
+def _summarize_detectable(judged: pd.DataFrame) -> pd.DataFrame:
+    """Smallest differences that a figure alone and the family could have seen, as shares
+    of the studies' median: the median over the figures of each quantity."""
+    median = judged.studies_median
+    shares = pd.DataFrame(
+        {
+            "quantity": judged.quantity.where(
+                ~judged.quantity.str.fullmatch(r"c\d+"), "compliances of Table 3"
+            ),
+            "low": 1 - judged.studies_low / median,
+            "high": judged.studies_high / median - 1,
+            "family_low": 1 - judged.unseen_low / median,
+            "family_high": judged.unseen_high / median - 1,
+        }
+    )
+    groups = shares.groupby("quantity", sort=False)
+    return groups.median().join(groups.size().rename("figures")).reset_index()
 
 
 def _name_robots(frame: pd.DataFrame, names: Mapping[str, str]) -> pd.DataFrame:
@@ -233,6 +271,16 @@ def format_paper_rows(
             }
         )
     return rows
+
+
+def format_pooled_deflections(table2: pd.DataFrame, names: Mapping[str, str]) -> str:
+    """Format the deflections before calibration over all configurations of all data sets,
+    mm, robot by robot."""
+    return "; ".join(
+        f"{names[row['robot']]} mean {row['mean_mm']:.3f}, std {row['std_mm']:.3f}, "
+        f"max {row['max_mm']:.2f} mm"
+        for row in _list_records(table2)
+    )
 
 
 def format_paper_tables(
@@ -303,7 +351,7 @@ def _list_estimators(table: pd.DataFrame, configurations: int) -> list[dict[str,
         k_sigma over the fixed joints under "fixed".
     """
     rows = []
-    listed = set()
+    listed: dict[tuple[str, str], str] = {}
     quantities = _find_table4_quantities(table)[:4]
     k_sigma, _, deviation, _ = quantities
     fixed = [
@@ -314,10 +362,13 @@ def _list_estimators(table: pd.DataFrame, configurations: int) -> list[dict[str,
         usual = by_average["stiffness"]
         # Leave out an estimator that is listed under another name, unless the joints
         # fixed in its last stage are fewer.
-        key = (robot, f"{usual[deviation]:.6g}")
-        if key in listed and usual[fixed[0]] == usual[k_sigma]:
-            continue
-        listed.add(key)
+        key = (str(robot), f"{usual[deviation]:.6g}")
+        name = str(strategy)
+        first = listed.setdefault(key, name)
+        if first != name:
+            if usual[fixed[0]] == usual[k_sigma]:
+                continue
+            name = f"{name} (estimator: {first})"
         cells_by_average = {
             average: _format_medians(row, quantities, configurations)
             for average, row in by_average.items()
@@ -326,7 +377,7 @@ def _list_estimators(table: pd.DataFrame, configurations: int) -> list[dict[str,
         rows.append(
             {
                 "robot": robot,
-                "strategy": strategy,
+                "strategy": name,
                 **cells_by_average,
                 "fixed": fixed_cells,
             }

@@ -230,3 +230,11 @@ def extrapolate_length(values: np.ndarray, limit: float) -> np.ndarray:
     longest = values.shape[-1]
     excess = np.maximum(np.abs(values[..., -1]) / limit, 1.0)
     return np.where(np.isfinite(kept), kept, longest * excess)
+
+
+def extrapolate_first_length(values: np.ndarray, limit: float) -> np.ndarray:
+    """As `extrapolate_length`, but the first length within the limit, even if longer data
+    sets leave it again (interpretation R14 the other way)."""
+    within = np.abs(values) <= limit
+    first = within.argmax(axis=-1) + 1.0
+    return np.where(within.any(axis=-1), first, extrapolate_length(values, limit))

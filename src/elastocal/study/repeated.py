@@ -143,25 +143,27 @@ def form_prefix_equations(
             study.seed, study.key, name, sets, study.size.configurations
         )
         noise = study.size.noise * np.moveaxis(order_by_configuration(normal), -1, 0)
-        columns = {
-            joint: scale[joint] * regressors[name][:, joint]
-            for joint in chain.moved_by(chain.point(name))
-        }
-        equations[name] = _sum_over_prefixes(columns, noise[:rows])
+        joints = chain.moved_by(chain.point(name))
+        columns = {joint: regressors[name][:, joint] for joint in joints}
+        equations[name] = _sum_over_prefixes(columns, noise[:rows], scale)
     return equations
 
 
 def _sum_over_prefixes(
-    columns: Mapping[int, np.ndarray], noise: np.ndarray
+    columns: Mapping[int, np.ndarray], noise: np.ndarray, scale: np.ndarray
 ) -> PrefixEquations:
-    """Inner products of columns by joint and of the noise, all (rows, configurations,
-    sets), summed over the configurations of every prefix."""
+    """Inner products of columns by joint, times the joint's scale, and of the noise, all
+    (rows, configurations, sets), summed over the configurations of every prefix."""
     pairs = [pair for pair in product(columns, columns) if pair[1] <= pair[0]]
     sums = np.empty((len(pairs) + len(columns), *noise.shape[1:]))
-    factors = [(columns[joint], columns[other]) for joint, other in pairs]
-    factors += [(column, noise) for column in columns.values()]
-    for element, (first, second) in zip(sums, factors, strict=True):
+    factors = [
+        (columns[joint], columns[other], scale[joint] * scale[other])
+        for joint, other in pairs
+    ]
+    factors += [(column, noise, scale[joint]) for joint, column in columns.items()]
+    for element, (first, second, factor) in zip(sums, factors, strict=True):
         np.einsum("rks,rks->ks", first, second, out=element)
+        element *= factor
     # A loop over the configurations is faster than numpy's cumulative sum, which goes
     # along an axis that is far apart in memory.
     for configuration in range(1, sums.shape[1]):
