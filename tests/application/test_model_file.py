@@ -150,6 +150,25 @@ def list_places(value, place=()):
         yield from list_places(entry, (*place, key))
 
 
+def test_a_process_is_fitted_again_with_the_same_hyperparameters(tmp_path):
+    calibrated = make_calibrated("kuka", "gaussian_process")
+    path = write_made_model(tmp_path / "arm.json", calibrated)
+    setting = read_model_file(path).fit.regression.choice.setting
+    expected = calibrated.residual_model.predictor.law().setting
+    assert setting["variance"] == expected["variance"]
+    assert setting["noise"] == expected["noise"]
+    finite = np.isfinite(expected["lengths"])
+    np.testing.assert_array_equal(
+        np.array(setting["lengths"])[finite], expected["lengths"][finite]
+    )
+    commands = draw_commands(calibrated, 50)
+    np.testing.assert_allclose(
+        predict_poses(read_again(path), *commands)[0],
+        predict_poses(calibrated, *commands)[0],
+        atol=1e-12,
+    )
+
+
 @pytest.mark.slow
 def test_a_model_file_of_any_contents_is_read_or_refused_in_a_line(written, tmp_path):
     """Single values of a file are replaced at random."""

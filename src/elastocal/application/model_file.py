@@ -60,13 +60,14 @@ from elastocal.validation.transfer import compute_joint_range, compute_load_limi
 from elastocal.verdict import RegressionChoice, Verdict
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
     from pathlib import Path
 
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.effects.protocol import Candidate, Parameter, Shape
     from elastocal.mechanics.robot import Robot
     from elastocal.mechanics.sites import Sites
+    from elastocal.residual_model.laws import Law
 
     Numbers = tuple[float, ...]
     Rows = tuple[Numbers, ...]
@@ -599,8 +600,7 @@ def _describe_regression(
     residual_model = calibrated.residual_model
     if residual_model is None or residual_model.choice is None:
         return None
-    express = residual_model.predictor.law
-    law = None if express is None else express()
+    law = _express(residual_model)
     formula: DisplacementSeries | GaussianProcess | Forest | None = None
     if isinstance(law, DisplacementLaw):
         formula = _describe_displacements(calibrated, law, compliance)
@@ -612,6 +612,12 @@ def _describe_regression(
     name = residual_model.choice.regression
     span = _make_range(*compute_regression_range(states), *compute_load_limits(states))
     return RegressionFormula(name, span, formula)
+
+
+def _express(residual_model: ResidualModel) -> Law | None:
+    """Express the regression by its formula, if it has one."""
+    express = residual_model.predictor.law
+    return None if express is None else express()
 
 
 def _describe_process(
@@ -700,6 +706,9 @@ def _describe_regression_fit(
             for entry in fields(RegressionChoice)
         }
     )
+    law = _express(residual_model)
+    if isinstance(law, ProcessLaw):
+        choice = replace(choice, setting=_describe_hyperparameters(law.setting))
     return RegressionFit(
         choice,
         _as_numbers(residual_model.target_offset_m),
@@ -708,6 +717,18 @@ def _describe_regression_fit(
         tuple(observations.target.tolist()),
         _as_rows(observations.position),
     )
+
+
+def _describe_hyperparameters(setting: Mapping[str, Any]) -> dict[str, Any]:
+    """Describe the hyperparameters of a process: estimated again, they would differ in
+    the ninth digit from one run to the next. An input without influence has an infinite
+    length, which is not used."""
+    lengths = np.asarray(setting["lengths"])
+    return {
+        "variance": float(setting["variance"]),
+        "lengths": _as_numbers(np.where(np.isfinite(lengths), lengths, 1.0)),
+        "noise": float(setting["noise"]),
+    }
 
 
 def _restore_declared_model(robot: Robot, record: FitRecord) -> Model:

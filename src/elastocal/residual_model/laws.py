@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
+
     from elastocal.effects.formulas import Term
 
 
@@ -47,6 +50,8 @@ class ProcessLaw:
     points : (N, d) array
     weights : (N, 3) array
     offset, size : (3,) arrays, m
+    setting : mapping
+        Hyperparameters with which the process is fitted again.
     """
 
     columns: np.ndarray
@@ -57,6 +62,7 @@ class ProcessLaw:
     weights: np.ndarray
     offset: np.ndarray
     size: np.ndarray
+    setting: Mapping[str, Any]
 
     def scaled(self, factor: float) -> ProcessLaw:
         """Scale the mean."""

@@ -551,7 +551,9 @@ def fit_gaussian_process(
     stream = np.random.default_rng(seed)
     chosen = setting or _tune_process(scaling, inputs, residual, stream)
     hyperparameters = _Hyperparameters(
-        chosen["variance"], chosen["lengths"][scaling.varying], chosen["noise"]
+        chosen["variance"],
+        np.asarray(chosen["lengths"])[scaling.varying],
+        chosen["noise"],
     )
     process = _fit_process(
         scaling.scale(inputs), scaling.standardize(residual), hyperparameters, stream
@@ -571,6 +573,7 @@ def fit_gaussian_process(
             process.weights,
             scaling.offset,
             scaling.size,
+            chosen,
         ),
     )
 
