@@ -25,7 +25,7 @@ _OTHER = "other"
 _GROSS_ERROR = "gross error"
 # Absolute tolerance of log odds: the search leaves out improbable pose errors, and
 # keeps the signs of other terms fixed while it sums over the scales of one.
-_LOG_ODDS = 0.1
+_LOG_ODDS = 0.25
 # Absolute tolerance of probabilities that follow from the stated log odds.
 _PROBABILITY = 1e-6
 # Less probable sets of mechanisms are not stated.
