@@ -21,7 +21,7 @@ extensions = [
 ]
 
 sphinx_gallery_conf = {
-    "examples_dirs": str(Path(__file__).resolve().parents[2] / "examples"),
+    "examples_dirs": str(Path(__file__).resolve().parents[2] / "examples" / "python"),
     "gallery_dirs": "examples",
     # Every example runs; a failing one fails the build.
     "filename_pattern": r"\.py$",
