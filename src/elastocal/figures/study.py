@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator
+from matplotlib.ticker import LogLocator, NullLocator
 
 from elastocal.figures.style import (
     MICRO,
@@ -412,8 +412,13 @@ def draw_multiverse(table: pd.DataFrame) -> Figure:
         axis.plot(factors.ours, rows, "o", color=PALETTE[0], label="as we read it")
         axis.plot(factors.other, rows, "D", color=PALETTE[1], label="the other way")
         axis.set(title=title, xscale="log", ylim=(len(numbers) - 0.5, -0.5))
-        axis.set_xlim(0.95, max(3.0, 1.1 * float(np.nanmax(factors.to_numpy()))))
+        largest = max(3.0, float(np.nanmax(factors.to_numpy())))
+        # The margin is a share of the logarithm, so that no diamond is cut at the edge.
+        axis.set_xlim(largest**-0.06, largest**1.08)
         label_decades(axis.xaxis)
+        if largest > 100.0:
+            # Numbers between the decades would run into one another.
+            axis.xaxis.set_major_locator(LogLocator(numticks=6))
         axis.grid(visible=False, axis="y")
     axes[0, 0].set_yticks(range(len(numbers)), labels=numbers)
     add_legend_below(
@@ -423,10 +428,15 @@ def draw_multiverse(table: pd.DataFrame) -> Figure:
 
 
 def _find_median_factor(cells: Any, name: str) -> pd.Series:
-    """Median factor, at least 1, between a column and the paper in each group."""
-    return cells.apply(
-        lambda cell: np.exp(np.log(cell[name] / cell.paper).abs().median())
-    )
+    """Median factor, at least 1, between a column and the paper in each group; a score
+    of the other sign has no factor."""
+
+    def find_median(cell: pd.DataFrame) -> float:
+        ratio = cell[name] / cell.paper
+        logarithm = np.log(ratio.where(ratio > 0.0))
+        return float(np.exp(logarithm.abs().median()))
+
+    return cells.apply(find_median)
 
 
 @styled
