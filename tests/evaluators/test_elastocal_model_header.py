@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from made_models import ROBOTS, draw_commands, make_calibrated, write_made_model
+from selected import slow_but
 
 from elastocal import evaluators
 from elastocal.application.calibrated import (
@@ -66,7 +67,11 @@ def test_poses_are_those_of_the_package(program, name, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "regression", ["ridge_harmonics", "two_joints", "gaussian_process", "extra_trees"]
+    "regression",
+    slow_but(
+        ["ridge_harmonics", "two_joints", "gaussian_process"],
+        ["ridge_harmonics", "two_joints", "gaussian_process", "extra_trees"],
+    ),
 )
 def test_regressions_are_those_of_the_package(program, regression, tmp_path):
     calibrated = make_calibrated("kuka", regression)
@@ -79,7 +84,7 @@ def test_regressions_are_those_of_the_package(program, regression, tmp_path):
     assert np.abs(physics[:, :3] - position).max() > 1e-5
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", slow_but(["ur10"], ROBOTS))
 def test_corrected_commands_reach_the_wanted_poses_by_the_package(
     program, name, tmp_path
 ):
