@@ -25,9 +25,6 @@ NO_ROTATION = (0.0, 0.0, 0.0)
 # Standard deviation of each coordinate of a declared offset that states none, m: a
 # caliper on a bracket, or a drawing of the tool.
 OFFSET_STD_M = 2e-4
-# Standard deviation of each coordinate of a declared base in each of several sessions, if
-# a campaign states none, m: trackers are registered to 0.05 to 0.3 mm.
-BASE_STD_M = 2e-4
 # Standard deviation of each coordinate of the point at which a load acts, if a campaign
 # states none, m: a hook or a weight is located with a rule and has play where it hangs.
 APPLICATION_POINT_STD_M = 1e-3
@@ -210,23 +207,10 @@ def assemble_campaign(
         application_point_std_m=float(
             document.get("application_point_std_m", APPLICATION_POINT_STD_M)
         ),
-        base_std_m=_parse_base_std_m(document, measurements),
+        base_std_m=float(document.get("base_std_m", 0.0)),
         table=document.get("table", ""),
         header_line=document.get("header_line"),
     )
-
-
-def _parse_base_std_m(document: Mapping[str, Any], measurements: Measurements) -> float:
-    """Return the standard deviation of a declared base, m.
-
-    The registration of a single session defines the frame in which the robot is
-    corrected, so that it is exact unless stated otherwise. Several registrations differ.
-    """
-    if document["frame"] != "base":
-        return 0.0
-    session = measurements.session
-    default = BASE_STD_M if (session != session[:1]).any() else 0.0
-    return float(document.get("base_std_m", default))
 
 
 def parse_targets(
