@@ -320,9 +320,9 @@ def alternative_study(wildcards):
     return study_in_memory(INTERPRETATIONS | changes, robot_of_alternative)(wildcards)
 
 
-def alternative_files(suffix):
+def alternative_files(kind):
     return [
-        f"results/alternatives/{number}/{robot}{suffix}.parquet"
+        f"results/alternatives/{number}/{kind}/{robot}.parquet"
         for number, robots in ALTERNATIVE_ROBOTS.items()
         for robot in robots
     ]

@@ -1,7 +1,7 @@
 """Repeated studies: how much studies of the same size differ, Table 4 over all of them, and studies under other interpretations.
 
-Needs only the configuration. Writes results/studies/{robot}.parquet, results/alternatives/{number}/{robot}.parquet with
-{robot}_initial.parquet, and reports/tables/strategies_over_studies.csv.
+Needs only the configuration. Writes results/studies/{robot}.parquet, of each interpretation the other way
+results/alternatives/{number}/studies/{robot}.parquet and initial/{robot}.parquet, and reports/tables/strategies_over_studies.csv.
 """
 
 
@@ -41,8 +41,8 @@ rule tabulate_studies:
 
 rule evaluate_alternative:
     output:
-        repeated="results/alternatives/{number}/{robot}.parquet",
-        initial="results/alternatives/{number}/{robot}_initial.parquet",
+        repeated="results/alternatives/{number}/studies/{robot}.parquet",
+        initial="results/alternatives/{number}/initial/{robot}.parquet",
     wildcard_constraints:
         number=r"R\d+",
         robot="|".join(map(re.escape, REDUCED)),

@@ -144,8 +144,8 @@ rule compare_with_studies:
 
 rule tabulate_multiverse:
     input:
-        alternatives=alternative_files(""),
-        alternatives_initial=alternative_files("_initial"),
+        alternatives=alternative_files("studies"),
+        alternatives_initial=alternative_files("initial"),
         studies=expand(rules.repeat_studies.output.repeated, robot=REDUCED),
         initial=expand(rules.summarize_initial.output.initial, robot=config["robots"]),
         reference=PRINTED_FIGURES,

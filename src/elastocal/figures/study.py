@@ -433,7 +433,7 @@ def _find_median_factor(cells: Any, name: str) -> pd.Series:
 
     def find_median(cell: pd.DataFrame) -> float:
         ratio = cell[name] / cell.paper
-        logarithm = np.log(ratio.where(ratio > 0.0))
+        logarithm = pd.Series(np.log(ratio[ratio > 0.0]))
         return float(np.exp(logarithm.abs().median()))
 
     return cells.apply(find_median)

@@ -226,7 +226,7 @@ def check_provenance(run: FinishedRun, file: str) -> Iterator[Finding]:
     yield require(
         "made for where it lies", _METADATA, not wrong, ", ".join(wrong), len(stated)
     )
-    expected = _list_expected_settings(run, stated)
+    expected = _list_expected_settings(run, file, stated)
     actual = configuration | configuration.get("study", {})
     # JSON turns tuples into lists.
     wrong = [
@@ -244,19 +244,31 @@ def check_provenance(run: FinishedRun, file: str) -> Iterator[Finding]:
 
 
 def _list_expected_settings(
-    run: FinishedRun, stated: Mapping[str, str]
+    run: FinishedRun, file: str, stated: Mapping[str, str]
 ) -> dict[str, Any]:
-    """List the configured settings for the robot and strategy that a file states."""
+    """List the configured settings for the robot and strategy that a file states; those
+    of an interpretation the other way for the files of its studies."""
+    alternatives = run.configuration["evaluation"]["alternatives"]
+    is_alternative = file.startswith("results/alternatives/")
+    number = file.split("/")[2] if is_alternative else ""
+    interpretations = run.configuration["interpretations"]
+    interpretations = interpretations | alternatives["interpretations"].get(number, {})
     settings: dict[str, Any] = {
-        "tool_offset_m": run.configuration["interpretations"]["tool_offset_m"],
-        "wrench_at": run.wrench_at,
+        "tool_offset_m": interpretations["tool_offset_m"],
+        "wrench_at": interpretations["wrench_at"],
         "seed": run.seed,
     }
-    robot = run.robots.get(stated.get("robot", ""))
-    if robot is not None:
+    name = stated.get("robot", "")
+    if name in run.robots:
+        robot = run.robots[name]
+        lengths_m = robot.get("lengths_m", {})
+        changed_m = alternatives["lengths_m"].get(number, {}).get(name, {})
+        if changed_m:
+            lengths_m = {**lengths_m, **changed_m}
+            robot = {**robot, "lengths_m": lengths_m}
         settings["robot"] = robot
         settings["chain"] = robot["chain"]
-        settings["lengths_m"] = robot.get("lengths_m", {})
+        settings["lengths_m"] = lengths_m
     strategy = run.strategies.get(stated.get("strategy", ""))
     if strategy is not None:
         settings["strategy"] = strategy

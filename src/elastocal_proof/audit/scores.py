@@ -244,8 +244,8 @@ class _TabulatedScore:
 
 
 def check_table4(run: FinishedRun, file: str) -> Iterator[Finding]:
-    """Every score at the tables' length, and the first length within the limits, from
-    the metrics."""
+    """Every score at the tables' length, and the length from which on it stays within
+    the limits, from the metrics."""
     length = run.configuration["tables"]["length"]
     scores = _list_tabulated_scores(run.configuration["tables"])
     for _, row in run.table(file).iterrows():
@@ -288,12 +288,16 @@ def _list_tabulated_scores(tables: Mapping[str, Any]) -> list[_TabulatedScore]:
 def _compute_tabulated_score(
     score: _TabulatedScore, cell: pd.DataFrame, length: int
 ) -> list[float]:
-    """Compute a score, its standard error, and the first length within its limit, which
-    is infinite if there is none."""
+    """Compute a score, its standard error, and the length from which on it stays within
+    its limit, which is infinite if the longest data set is beyond it."""
     curve = score.factor * cell[score.column]
     std_error = score.factor * cell[f"{score.column}_std_error"].loc[length]
-    within = curve.index[curve.abs() <= score.limit]
-    return [curve.loc[length], std_error, within[0] if len(within) else np.inf]
+    is_within = curve.abs() <= score.limit
+    # From the longest data set backwards, all lengths up to the first one beyond.
+    stays_within = is_within[::-1].cummin()
+    lengths = stays_within.index[stays_within]
+    kept_length = lengths.min() if len(lengths) else np.inf
+    return [curve.loc[length], std_error, kept_length]
 
 
 def check_table_for_people(
