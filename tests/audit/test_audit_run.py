@@ -41,6 +41,22 @@ def write(folder, seed=1, robot="two"):
     forge(folder.folder, FILE)
 
 
+@pytest.mark.parametrize(
+    ("wrench_at", "holds"), [("measuring_point", True), ("end_effector", False)]
+)
+def test_a_study_of_another_interpretation_has_its_settings(folder, wrench_at, holds):
+    file = "results/alternatives/R6/initial/two.parquet"
+    (folder.folder / file).parent.mkdir(parents=True)
+    block = {name: [1e-3] for name in ("mean", "mean_square", "maximum")}
+    block |= {"data_set": [0], "configurations": [5]}
+    configuration = {"seed": 1, "wrench_at": wrench_at}
+    origin = written_by(configuration, robot="two")
+    write_table(folder.folder / file, INITIAL, [block], origin)
+    forge(folder.folder, file)
+    expected = [] if holds else ["made by what is configured"]
+    assert failed(audit_run(folder)) == expected
+
+
 def test_an_unaltered_file_holds(folder):
     write(folder)
     findings = audit_run(folder)

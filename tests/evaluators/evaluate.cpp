@@ -36,14 +36,14 @@ struct Row {
   elastocal::Pose wanted;
 };
 
-// Shortest time of a corrected target over several passes, in microseconds of the
+// Shortest time of an evaluation of a row over several passes, in microseconds of the
 // processor, because other programs share the machine.
-double find_shortest_us(const elastocal::Model& model, const std::vector<Row>& rows,
-                        elastocal::Workspace& workspace) {
+template <typename Evaluate>
+double find_shortest_us(const std::vector<Row>& rows, Evaluate evaluate) {
   double shortest = 1e9;
   for (int pass = 0; pass < 20; ++pass) {
     const std::clock_t begin = std::clock();
-    for (const Row& row : rows) model.correct(row.wanted, row.command, row.wrench, workspace);
+    for (const Row& row : rows) evaluate(row);
     const double seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
     shortest = std::min(shortest, 1e6 * seconds / static_cast<double>(rows.size()));
   }
@@ -65,7 +65,14 @@ int main(int, char** arguments) {
     for (auto row = read_row(width); !row.empty(); row = read_row(width))
       rows.emplace_back(row, joints);
     if (what == "time") {
-      std::cout << find_shortest_us(model, rows, workspace) << "\n";
+      const auto correct = [&](const Row& row) {
+        model.correct(row.wanted, row.command, row.wrench, workspace);
+      };
+      const auto predict = [&](const Row& row) {
+        model.predict(row.command, row.wrench, workspace);
+      };
+      std::cout << find_shortest_us(rows, correct) << " " << find_shortest_us(rows, predict)
+                << "\n";
       return 0;
     }
     for (const Row& row : rows) {

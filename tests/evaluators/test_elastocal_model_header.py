@@ -23,8 +23,9 @@ from elastocal.application.compensation import find_joint_targets
 HEADERS = Path(evaluators.__file__).parent
 SOURCE = Path(__file__).with_name("evaluate.cpp")
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror")
-# Bound on the processor's time for a corrected target of six joints, µs.
-LONGEST_US = 20.0
+# Bound on the cost of a corrected target, in predictions; some four were measured, and
+# each step of Newton's method that is added costs one.
+MOST_PREDICTIONS = 5.0
 
 
 @pytest.fixture(scope="session")
@@ -48,7 +49,7 @@ def program(tmp_path_factory):
         if finished.returncode:
             raise RuntimeError(finished.stderr.decode())
         if what == "time":
-            return float(finished.stdout)
+            return [float(number) for number in finished.stdout.split()]
         return np.frombuffer(finished.stdout).reshape(len(rows), -1)
 
     return evaluate
@@ -116,13 +117,14 @@ def test_commands_beyond_the_campaign_are_those_of_the_package(program, tmp_path
 
 
 @pytest.mark.slow
-def test_a_target_takes_less_than_twenty_microseconds(program, tmp_path):
-    """Of the processor, with every kind of effect; some 14 were measured."""
+def test_a_corrected_target_costs_a_few_predictions(program, tmp_path):
+    """With every kind of effect; both are timed in one run."""
     calibrated = make_calibrated("kuka")
     path = write_made_model(tmp_path / "arm.json", calibrated)
     commands, wrench = draw_commands(calibrated)
     pose = compute_nominal_poses(calibrated.robot, commands)
-    assert program(path, "time", commands, wrench, *pose) <= LONGEST_US
+    correction_us, prediction_us = program(path, "time", commands, wrench, *pose)
+    assert correction_us <= MOST_PREDICTIONS * prediction_us
 
 
 @pytest.mark.parametrize(
