@@ -167,3 +167,10 @@ def test_figures_that_the_studies_lack_stay_empty():
     assert table.p_value.notna().tolist() == [True, False]
     assert build_joint_row(figures, values)["figures"] == 1
     assert build_joint_row(figures[1:], values[:, 1:])["figures"] == 0
+
+
+def test_without_a_figure_nothing_differs_and_no_p_value_is_stated():
+    values = np.full((5, 2), np.nan)
+    row = build_joint_row(pd.DataFrame(index=range(2)), values)
+    assert row["figures"] == row["differ"] == 0
+    assert np.isnan(row["largest_distance_p"]) and np.isnan(row["below_p"])

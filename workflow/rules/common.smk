@@ -310,8 +310,11 @@ ALTERNATIVE_ROBOTS |= {
 def robot_of_alternative(wildcards):
     """Return the document of a robot with the lengths of an interpretation the other way."""
     document = robot_document(wildcards)
-    robots = ALTERNATIVES["lengths_m"].get(wildcards.number, {})
-    return document | {"lengths_m": document["lengths_m"] | robots.get(wildcards.robot, {})}
+    lengths_m = ALTERNATIVES["lengths_m"].get(wildcards.number, {}).get(wildcards.robot)
+    # A chain may state its lengths itself.
+    if lengths_m is None:
+        return document
+    return document | {"lengths_m": document["lengths_m"] | lengths_m}
 
 
 def alternative_study(wildcards):

@@ -288,7 +288,10 @@ def build_joint_row(printed: pd.DataFrame, values: np.ndarray) -> dict[str, Any]
         "studies": len(values),
     }
     if not covered.any():
-        return row
+        # The paper prints nothing of these robots and strategies.
+        nothing = np.full(2, np.nan)
+        ranks = _rank_first("largest_distance", nothing) | _rank_first("below", nothing)
+        return row | {"differ": 0} | dict.fromkeys(ranks, np.nan)
     members = join_members(printed[covered], values[:, covered])
     distances, _ = measure_distances(members)
     below = (rank_two_sided(members) < SIGNIFICANCE_LEVEL).sum(axis=1)
