@@ -15,6 +15,7 @@ from elastocal.io.records import (
     JobRecord,
     digest_inputs,
     list_recorded_files,
+    list_recorded_outputs,
     locate_record,
     read_record,
     trace_jobs,
@@ -141,6 +142,13 @@ def test_an_altered_character_of_a_record_is_noticed():
             match=r"^results/records/results/fit\.json\.json: found no record of a job ",
         ):
             read_record(FITTED)
+
+
+def test_a_folder_is_one_output_with_several_files():
+    outputs = list_recorded_outputs()
+    assert MEASURED in outputs and ALTERED[MEASURED] not in outputs
+    files = [file for output in outputs for file in read_record(output)[1]]
+    assert sorted(files) == sorted(list_recorded_files())
 
 
 def test_sha256sum_checks_the_recorded_files():

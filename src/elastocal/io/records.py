@@ -125,15 +125,20 @@ def _refusal(path: Path, finding: str, outputs: str = "it") -> InputError:
     return InputError(path, "", finding, allowed)
 
 
-def list_recorded_files(within: str | Path = "") -> dict[str, str]:
-    """Return the SHA-256 of every file that has a record, by its path."""
+def list_recorded_outputs(within: str | Path = "") -> list[str]:
+    """List the paths of every file and folder that has a record."""
     top = Path(within, RECORDS)
-    outputs = sorted(
+    return sorted(
         record.relative_to(top).as_posix().removesuffix(".json")
         for record in top.rglob("*.json")
     )
+
+
+def list_recorded_files(within: str | Path = "") -> dict[str, str]:
+    """Return the SHA-256 of every file that has a record or is in a folder that has one,
+    by its path."""
     digests: dict[str, str] = {}
-    for output in outputs:
+    for output in list_recorded_outputs(within):
         digests |= read_record(output, within)[1]
     return digests
 
