@@ -158,7 +158,7 @@ def test_probabilities_follow_from_the_columns(run_with_evidence):
 @pytest.mark.parametrize(
     ("file", "at", "change", "expected"),
     [
-        (EVIDENCE, ["models", 2, "log_odds"], lambda odds: odds + 0.5, "log odds"),
+        (EVIDENCE, ["models", 2, "log_odds"], lambda odds: odds + 0.3, "log odds"),
         (EVIDENCE, ["residual", 4], lambda value: value + 1, "log odds"),
         (
             VERDICT,

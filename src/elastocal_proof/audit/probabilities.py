@@ -25,7 +25,7 @@ _OTHER = "other"
 _GROSS_ERROR = "gross error"
 # Absolute tolerance of log odds: the search leaves out improbable pose errors, and
 # keeps the signs of other terms fixed while it sums over the scales of one.
-_LOG_ODDS = 0.25
+_LOG_ODDS = 0.1
 # Absolute tolerance of probabilities that follow from the stated log odds.
 _PROBABILITY = 1e-6
 # Less probable sets of mechanisms are not stated.
@@ -188,22 +188,12 @@ class TracedEvidence:
     def state_probabilities(self) -> dict[tuple[str, ...], float]:
         """Compute the probability of each set of mechanisms from the stated log odds,
         tempered between sets by which something is missing."""
-        log_odds = np.array([model["log_odds"] for model in self.models])
-        by_set: dict[tuple[str, ...], float] = defaultdict(float)
-        for model, probability in zip(
-            self.models, np.exp(log_odds - logsumexp(log_odds)), strict=True
-        ):
-            by_set[self._find_acting(model, probability)] += probability
+        by_set = self._sum_by_set()
         nothing = by_set.pop((), 0.0)
         missing = {names: value for names, value in by_set.items() if value > 0.0}
         if not missing:
             return {(): nothing}
-        best = next(model for model in self.models if model["terms"])
-        mechanisms = {term["mechanism"] for term in self.list_terms(best)}
-        squares = sum(self._split_squares(best, {name})[0][0] for name in mechanisms)
-        departure = self.settings["confusable_share"]
-        departure *= self.settings["law_tolerance"] ** 2 * squares
-        power = 1.0 / (1.0 + 0.5 * departure)
+        power = self._compute_power()
         leader = max(missing, key=missing.__getitem__)
 
         def temper(names: tuple[str, ...]) -> float:
@@ -218,6 +208,25 @@ class TracedEvidence:
         shares = np.exp(np.array([*odds.values()]) - logsumexp([*odds.values()]))
         shares *= sum(missing.values())
         return {(): nothing} | dict(zip(odds, shares.tolist(), strict=True))
+
+    def _sum_by_set(self) -> dict[tuple[str, ...], float]:
+        """Sum the probabilities of the models by their set of mechanisms."""
+        log_odds = np.array([model["log_odds"] for model in self.models])
+        probabilities = np.exp(log_odds - logsumexp(log_odds))
+        by_set: dict[tuple[str, ...], float] = defaultdict(float)
+        for model, probability in zip(self.models, probabilities, strict=True):
+            by_set[self._find_acting(model, probability)] += probability
+        return by_set
+
+    def _compute_power(self) -> float:
+        """Power to which odds between mechanisms are tempered: the smaller, the larger
+        the displacements that laws describe only nearly."""
+        best = next(model for model in self.models if model["terms"])
+        mechanisms = {term["mechanism"] for term in self.list_terms(best)}
+        squares = sum(self._split_squares(best, {name})[0][0] for name in mechanisms)
+        departure = self.settings["confusable_share"]
+        departure *= self.settings["law_tolerance"] ** 2 * squares
+        return float(1.0 / (1.0 + 0.5 * departure))
 
     def _find_acting(
         self, model: Mapping[str, Any], probability: float
@@ -250,9 +259,8 @@ class TracedEvidence:
         distance = np.abs(self._pose_errors - model["pose_error_rad"])
         measurements = self._measurements[int(np.argmin(distance))]
         spread = measurements.columns[:, columns] * deviations
-        covariance = np.eye(len(spread)) + spread @ spread.T
-        solution = np.linalg.solve(covariance, measurements.residual)
-        coefficients = deviations * (spread.T @ solution)
+        unexplained = _solve_covariance(spread, measurements.residual)
+        coefficients = deviations * (spread.T @ unexplained)
         in_group = np.concatenate(
             [len(term["columns"]) * [term["mechanism"] in mechanisms] for term in terms]
         )
@@ -260,10 +268,15 @@ class TracedEvidence:
         squares = []
         for group in (in_group, ~in_group):
             made = at_rest[:, group] @ coefficients[group]
-            other = at_rest[:, ~group] * deviations[~group]
-            left = np.linalg.solve(np.eye(len(other)) + other @ other.T, made)
-            squares.append((float(made @ made), float(made @ left)))
+            of_rivals = at_rest[:, ~group] * deviations[~group]
+            unexplained = _solve_covariance(of_rivals, made)
+            squares.append((float(made @ made), float(made @ unexplained)))
         return squares
+
+
+def _solve_covariance(spread: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Solve for values (R,) with the covariance I + spread spread'."""
+    return np.linalg.solve(np.eye(len(spread)) + spread @ spread.T, values)
 
 
 def _compute_log_normal(
@@ -376,9 +389,9 @@ def _compare_probabilities(
             [by_mechanism[name] for name in stated["mechanisms"]],
         ),
     }
-    for name, (found, expected) in pairs.items():
+    for name, compared in pairs.items():
         yield compare(
-            f"probability of {name}", "numpy, scipy", found, expected, 0.0, _PROBABILITY
+            f"probability of {name}", "numpy, scipy", *compared, 0.0, _PROBABILITY
         )
 
 
