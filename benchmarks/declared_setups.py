@@ -27,6 +27,7 @@ from declared_values import (
     HELD_OUT,
     ROBOTS,
     Specimen,
+    calibrate,
     draw_specimen,
     measure_true_errors,
     read_weightless,
@@ -40,7 +41,6 @@ from elastocal.application.frames import root_mean_square
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.model import Case
-from elastocal.loop.whole import build_calibrated_robot, judge_and_predict
 from elastocal_proof.plant.arm import build_arm
 from elastocal_proof.plant.campaigns import (
     Design,
@@ -190,11 +190,7 @@ def correct_after_sessions(seed: int, off_m: float, std_m: float) -> Outcome:
     tool with the bounds."""
     specimen = draw_specimen(ROBOTS[seed % len(ROBOTS)], seed, 0.0, 0.0)
     case, held_out = draw_sessions(specimen, seed, off_m, std_m)
-    diagnosis = diagnose(case, Settings(), seed)
-    judgement = judge_and_predict(diagnosis, held_out, seed)
-    calibrated = build_calibrated_robot(
-        diagnosis, judgement.held_out, judgement.delivered
-    )
+    judgement, calibrated = calibrate(case, held_out, seed)
     error_m, reached = measure_true_errors(specimen, calibrated, seed)
     prediction = predict_errors(calibrated, *select_campaign_commands(calibrated))
     within = error_m <= prediction.bound_m[reached]

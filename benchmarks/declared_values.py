@@ -30,6 +30,7 @@ from elastocal.application.compensation import find_joint_targets
 from elastocal.application.frames import root_mean_square, subtract_placement
 from elastocal.campaigns.writing import write_campaign
 from elastocal.diagnosis.diagnose import diagnose
+from elastocal.diagnosis.judge import Judgement
 from elastocal.diagnosis.settings import Settings
 from elastocal.exchange.target_path import OK
 from elastocal.fitting.model import Case
@@ -275,17 +276,25 @@ def measure_true_errors(
     return np.linalg.norm(placed[:, :3, 0], axis=1), reached
 
 
+def calibrate(
+    case: Case, held_out: Case, seed: int
+) -> tuple[Judgement, CalibratedRobot]:
+    """Diagnose and judge a robot, and build it with what is delivered."""
+    diagnosis = diagnose(case, Settings(), seed)
+    judgement = judge_and_predict(diagnosis, held_out, seed)
+    calibrated = build_calibrated_robot(
+        diagnosis, judgement.held_out, judgement.delivered
+    )
+    return judgement, calibrated
+
+
 def correct_specimen(seed: int, off_m: float, noise_m: float, poses: int) -> Outcome:
     """Diagnose and correct a robot, and compare its true tool with what is stated."""
     name = ROBOTS[seed % len(ROBOTS)]
     specimen = draw_specimen(name, seed, off_m, 0.0)
     frame = ("base", "tracker")[seed // len(ROBOTS) % 2]
     case, held_out = draw_cases(specimen, poses, noise_m, seed, frame)
-    diagnosis = diagnose(case, Settings(), seed)
-    judgement = judge_and_predict(diagnosis, held_out, seed)
-    calibrated = build_calibrated_robot(
-        diagnosis, judgement.held_out, judgement.delivered
-    )
+    judgement, calibrated = calibrate(case, held_out, seed)
     error_m, reached = measure_true_errors(specimen, calibrated, seed)
     prediction = predict_errors(calibrated, *select_campaign_commands(calibrated))
     decisions = [

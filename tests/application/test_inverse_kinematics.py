@@ -58,6 +58,15 @@ def test_a_step_may_be_five_times_the_rotation_of_the_path_and_ten_degrees():
     np.testing.assert_allclose(np.degrees(allowed), 25.0)
 
 
+def assert_solved_in_allowed_steps(robot, wanted):
+    """Solve a path; return its joint angles."""
+    path, error_m = solve_path(robot, *wanted)
+    assert error_m.max() < SOLVED_M
+    steps = np.abs(np.diff(path, axis=0))
+    assert (steps <= compute_allowed_steps(robot, *wanted)).all()
+    return path
+
+
 def interpolate_path(robot, count):
     """Poses of a smooth path of the joints through six random postures."""
     low, high = robot.joint_limits.T
@@ -99,10 +108,7 @@ def test_a_path_through_aligned_wrists_keeps_the_angles_of_its_neighbours():
     angles[8:13, 4] = 0.0
     angles[8:13, 0] += np.radians([0.0, 0.5, 1.0, 0.5, 0.0])
     wanted = compute_poses(robot.chain, angles, robot.chain.end_effector)
-    path, error_m = solve_path(robot, *wanted)
-    assert error_m.max() < SOLVED_M
-    steps = np.abs(np.diff(path, axis=0))
-    assert (steps <= compute_allowed_steps(robot, *wanted)).all()
+    assert_solved_in_allowed_steps(robot, wanted)
 
 
 @pytest.mark.parametrize("name", ["kuka", "ur10"])
@@ -111,10 +117,8 @@ def test_a_robot_with_calibrated_axes_starts_from_the_closed_form(name, monkeypa
     robot = replace(robot, chain=perturb_axes(robot.chain, 5e-4))
     wanted = interpolate_path(robot, 60)
     monkeypatch.setattr(inverse_kinematics, "_solve_from_anchors", None)
-    path, error_m = solve_path(robot, *wanted)
-    assert error_m.max() < SOLVED_M and not find_beyond_limits(robot, path).any()
-    steps = np.abs(np.diff(path, axis=0))
-    assert (steps <= compute_allowed_steps(robot, *wanted)).all()
+    path = assert_solved_in_allowed_steps(robot, wanted)
+    assert not find_beyond_limits(robot, path).any()
 
 
 def test_a_path_through_an_aligned_wrist_of_parallel_axes_is_continued():
@@ -126,7 +130,4 @@ def test_a_path_through_an_aligned_wrist_of_parallel_axes_is_continued():
     angles[8:13, 4] = 0.0
     angles[8:13, 0] += np.radians([0.0, 0.5, 1.0, 0.5, 0.0])
     wanted = compute_poses(robot.chain, angles, robot.chain.end_effector)
-    path, error_m = solve_path(robot, *wanted)
-    assert error_m.max() < SOLVED_M
-    steps = np.abs(np.diff(path, axis=0))
-    assert (steps <= compute_allowed_steps(robot, *wanted)).all()
+    assert_solved_in_allowed_steps(robot, wanted)

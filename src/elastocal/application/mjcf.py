@@ -22,8 +22,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.effects.gravity import DECLARED_WEIGHT
+from elastocal.effects.protocol import effect_of
 from elastocal.exchange.robot_text import make_elementary_transform
-from elastocal.exchange.urdf_writing import estimate_inertia
+from elastocal.exchange.urdf_writing import estimate_inertia, number_joints
 from elastocal.mechanics.chain import AXES
 
 if TYPE_CHECKING:
@@ -69,29 +70,25 @@ class MjcfModel:
 def build_mjcf(model: ModelFile) -> MjcfModel:
     """Build the model of MuJoCo from the contents of a model file."""
     expressed = [effect for effect in model.effects if _is_expressible(effect)]
-    left_out = tuple(
-        effect.key for effect in model.effects if not _is_expressible(effect)
-    )
+    left_out = tuple(effect.key for effect in model.effects if effect not in expressed)
     terms = [*model.springs, *(term for effect in expressed for term in effect.terms)]
     arm = _Arm(model, terms)
     for number, transform in enumerate(model.kinematics.transforms):
         arm.add_bodies(number)
         arm.add_transform(transform)
     arm.add_bodies(len(model.kinematics.transforms))
-    arm.add_payloads([effect for effect in expressed if _get_name(effect) == _PAYLOAD])
+    arm.add_payloads(
+        [effect for effect in expressed if effect_of(effect.key) == _PAYLOAD]
+    )
     arm.add_end_effector()
     ElementTree.indent(arm.root)
     text = ElementTree.tostring(arm.root, encoding="unicode") + "\n"
     return MjcfModel(text, left_out)
 
 
-def _get_name(effect: ModelEffect) -> str:
-    return effect.key.split("@")[0].split("[")[0]
-
-
 def _is_expressible(effect: ModelEffect) -> bool:
     """Whether rigid bodies and springs have the effect."""
-    if _get_name(effect) in (*_IN_SPRINGS_AND_BODIES, _PAYLOAD):
+    if effect_of(effect.key) in (*_IN_SPRINGS_AND_BODIES, _PAYLOAD):
         return True
     return all(_is_constant(term) or _is_spring(term) for term in effect.terms)
 
@@ -103,9 +100,9 @@ def _is_constant(term: Term) -> bool:
 
 def _is_spring(term: Term) -> bool:
     """Whether a coordinate yields to its own load."""
-    others = (term.orders, term.angles, term.limited, term.weight)
+    further_factors = (term.orders, term.angles, term.limited, term.weight)
     yields = term.loads == (term.coordinate,) and term.value > 0.0
-    return yields and not any(others)
+    return yields and not any(further_factors)
 
 
 class _Arm:
@@ -210,7 +207,7 @@ class _Arm:
         number = transform.coordinate
         assert number is not None
         names = self._model.robot.get("joint_names")
-        name = names[number] if names else f"joint{number + 1}"
+        name = (names or number_joints(self._model.kinematics.joints))[number]
         low, high = self._model.kinematics.joint_limits[number]
         span = _format([low, high])
         self._add_motion(transform, name, compliance, range=span)

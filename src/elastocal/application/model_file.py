@@ -815,7 +815,7 @@ def _as_json(column: np.ndarray) -> list[Any]:
     if column.dtype.kind != "f" or not np.isnan(column).any():
         listed: list[Any] = column.tolist()
         return listed
-    known = column.astype(object)
-    known[np.isnan(column)] = None
-    listed = known.tolist()
+    objects = column.astype(object)
+    objects[np.isnan(column)] = None
+    listed = objects.tolist()
     return listed

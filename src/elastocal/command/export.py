@@ -100,23 +100,22 @@ def export(
     check_replaceable(files, inputs, find_workplace(), force=force)
     # No file can hold the regression, so the files are of the robot without it.
     calibrated = campaign.without_regression().calibrated
-    nominal = calibrated.robot
     folded = fold_effects(calibrated)
     states = campaign.case.observations.states
-    commands = nominal.reported_angles(states.joint_angles)
+    commands = calibrated.robot.reported_angles(states.joint_angles)
     details = _describe_losses(campaign, calibrated, folded, commands, states.wrench)
     accuracy = predict_campaign_accuracy(calibrated)
     details += [format_accuracy(accuracy), str(output / ROBOT)]
     corrected = None
     if urdf is not None:
-        corrected = write_calibrated_origins(urdf, nominal, folded.robot)
+        corrected = write_calibrated_origins(urdf, calibrated.robot, folded.robot)
     with write_together(output, names) as partial:
         write_robot_file(partial / ROBOT, folded, campaign.name)
         details += further.write(campaign, partial, output)
         if corrected is not None:
             (partial / URDF).write_bytes(corrected.content)
             urdf_poses = compute_urdf_poses(
-                corrected, partial / URDF, nominal, commands
+                corrected, partial / URDF, calibrated.robot, commands
             )
             deviation_m = compute_urdf_deviation_m(
                 urdf_poses[0], folded.robot, commands

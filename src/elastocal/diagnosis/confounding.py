@@ -187,8 +187,8 @@ class _Target:
         """Squares that another mechanism must explain to reproduce the displacements:
         of those that the companions leave, all but the tolerance of laws."""
         alone = self.build_system([])
-        left = alone.total - alone.solve([])[0]
-        return alone.total - self.problem.settings.law_tolerance**2 * left
+        unexplained = alone.total - alone.solve([])[0]
+        return alone.total - self.problem.settings.law_tolerance**2 * unexplained
 
     def _choose_variants(self, indices: Sequence[int]) -> list[int]:
         """Of the variants at each location, choose the one that reproduces most."""

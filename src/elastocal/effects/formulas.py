@@ -401,14 +401,14 @@ def list_terms(coordinate: int, expression: Expression) -> Iterator[Term]:
     amplitudes: dict[Any, np.ndarray] = defaultdict(lambda: np.zeros((2, 4)))
     for product, coefficient in expression.parts.items():
         orders, sense = _split_waves(product)
-        others, body, component = _split_weight(product)
+        factors, body, component = _split_weight(product)
         # Of c exp(i phi) and its conjugate, the sum is 2 Re(c) cos phi - 2 Im(c) sin phi.
         wave = (complex(coefficient).real, -sense * complex(coefficient).imag)
-        amplitudes[orders, others, body][:, component] += wave
-    for (orders, others, body), by_wave in amplitudes.items():
+        amplitudes[orders, factors, body][:, component] += wave
+    for (orders, factors, body), by_wave in amplitudes.items():
         for name, amounts in zip(("cos", "sin"), by_wave, strict=True):
             if amounts.any():
-                yield _make_term(coordinate, name, orders, others, body, amounts)
+                yield _make_term(coordinate, name, orders, factors, body, amounts)
 
 
 def _split_waves(product: Monomial) -> tuple[tuple[tuple[int, float], ...], float]:
@@ -426,15 +426,15 @@ def _split_weight(product: Monomial) -> tuple[Monomial, Atom | None, int]:
     if not weights:
         return frozenset(entry for entry in product if entry[0][0] != _WAVE), None, 0
     ((atom, _),) = weights
-    others = frozenset(e for e in product if e[0][0] not in (_WAVE, _WEIGHT))
-    return others, atom[1:3], atom[3]
+    factors = frozenset(e for e in product if e[0][0] not in (_WAVE, _WEIGHT))
+    return factors, atom[1:3], atom[3]
 
 
 def _make_term(
     coordinate: int,
     wave: str,
     orders: tuple[tuple[int, float], ...],
-    others: Monomial,
+    factors: Monomial,
     body: Atom | None,
     amounts: np.ndarray,
 ) -> Term:
@@ -442,7 +442,7 @@ def _make_term(
     0, 0) without a weight."""
     repeated: dict[str, list[int]] = {_ANGLE: [], _LOAD: []}
     limited = None
-    for atom, power in sorted(others):
+    for atom, power in sorted(factors):
         if atom[0] in repeated:
             repeated[atom[0]] += [atom[1]] * _as_count(power)
         else:

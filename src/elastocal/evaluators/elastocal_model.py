@@ -229,10 +229,9 @@ class Model:
             if coordinate is not None:
                 amount = sign * coordinates[:, coordinate]
                 index[coordinate] = number
-                turns = transform["kind"] == "R"
-                linear = np.cross(position, direction) if turns else direction
-                twists[:, :3, coordinate] = linear
-                twists[:, 3:, coordinate] = direction if turns else 0.0
+                twists[:, :, coordinate] = _make_twist(
+                    transform["kind"], position, direction
+                )
             if transform["kind"] == "T":
                 position = position + amount[:, None] * rotation[:, :, axis]
             else:
@@ -364,6 +363,13 @@ def _evaluate_process(
     root = np.sqrt(np.maximum(5.0 * (square - 2.0 * scaled @ points.T), 0.0))
     kernel = (1.0 + root + root**2 / 3.0) * np.exp(-root)
     return np.asarray(kernel @ law["weights"] * law["size"] + law["offset"])
+
+
+def _make_twist(kind: str, position: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Spatial twists (N, 6) of motions along or about axes through positions (N, 3)."""
+    if kind == "T":
+        return np.hstack([direction, np.zeros_like(direction)])
+    return np.hstack([np.cross(position, direction), direction])
 
 
 def _turn(rotation: np.ndarray, axis: int, angle: np.ndarray) -> np.ndarray:

@@ -115,8 +115,8 @@ class MakersFile:
             document = {name: {"kinematic": entry} for name, entry in entries.items()}
         else:
             stated = self.document["kinematics"]
-            others = {key: value for key, value in stated.items() if key == "hash"}
-            document = {"kinematics": entries | others}
+            digest = {key: value for key, value in stated.items() if key == "hash"}
+            document = {"kinematics": entries | digest}
         return yaml.safe_dump(document, sort_keys=False)
 
 
@@ -143,8 +143,8 @@ def read_makers_file(path: str | Path) -> MakersFile:
         entries = {name: entry["kinematic"] for name, entry in document.items()}
         names = FRANKA_JOINTS
     if {*entries} != {*names}:
-        found = ", ".join(entries)
-        raise InputError(source, "", f"the links {found}", ", ".join(names))
+        finding = f"the links {', '.join(entries)}"
+        raise InputError(source, "", finding, ", ".join(names))
     origins = []
     for name in names:
         values = [float(entries[name][key]) for key in _KEYS]

@@ -28,7 +28,7 @@ from elastocal.exchange.robot_text import (
 from elastocal.exchange.urdf import LARGEST_BYTES, Joint, Urdf, find_chain, read_urdf
 from elastocal.io.storage import Columns
 from elastocal.io.texts import read_bytes
-from elastocal.mechanics.chain import Chain, Transform, parse_chain
+from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform, parse_chain
 from elastocal.mechanics.robot import Mass, Robot
 
 # Upper bound on the difference of equal transforms, m and rad: rounding in a file or in a
@@ -213,7 +213,7 @@ def build_urdf(nominal: Robot, calibrated: Robot) -> str:
     offset = find_offset_at_zero(nominal, calibrated)
     masses = {mass.link: mass for mass in calibrated.masses}
     parent = _add_link(root, "base_link", masses.get(0))
-    names = calibrated.joint_names or _number_joints(calibrated.joints)
+    names = calibrated.joint_names or number_joints(calibrated.joints)
     for number, moving in enumerate(links.moving):
         child = _add_link(root, f"link{number + 1}", masses.get(number + 1))
         shift = moving.sign * offset[number]
@@ -223,10 +223,7 @@ def build_urdf(nominal: Robot, calibrated: Robot) -> str:
         joint = _add_joint(root, names[number], kind, (parent, child), origin)
         _limit_motion(joint, moving, nominal.joint_limits[number])
         parent = child
-    end = calibrated.chain.end_effector
-    tip = _add_link(root, format_point_name(end.name), None)
-    origin = links.fixed[-1] @ make_transform(np.eye(3), end.offset_m)
-    _add_joint(root, f"{parent}_to_{tip}", "fixed", (parent, tip), origin)
+    _add_tip(root, parent, calibrated.chain.end_effector, links.fixed[-1])
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
 
@@ -266,7 +263,18 @@ def _add_joint(
     return joint
 
 
-def _number_joints(joints: int) -> tuple[str, ...]:
+def _add_tip(
+    root: ElementTree.Element, parent: str, point: MeasuringPoint, fixed: np.ndarray
+) -> None:
+    """Add a link at a measuring point, behind a fixed transform (4, 4) of the last
+    moving link."""
+    tip = _add_link(root, format_point_name(point.name), None)
+    origin = fixed @ make_transform(np.eye(3), point.offset_m)
+    _add_joint(root, f"{parent}_to_{tip}", "fixed", (parent, tip), origin)
+
+
+def number_joints(joints: int) -> tuple[str, ...]:
+    """Name the joints of a robot that states no names: ``joint1`` and so on."""
     return tuple(f"joint{number}" for number in range(1, joints + 1))
 
 

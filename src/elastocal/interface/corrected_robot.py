@@ -214,8 +214,8 @@ class CorrectedRobot:
         """
         if tolerance_m is not None:
             _check_tolerance("verify", tolerance_m, accepted_risk)
-        known = [*get_targets(self.calibrated).values()]
-        reflectors = list_reflectors(known, self.nominal, "verify")
+        campaign_targets = [*get_targets(self.calibrated).values()]
+        reflectors = list_reflectors(campaign_targets, self.nominal, "verify")
         joints = self.nominal.joints
         if isinstance(targets, (str, Path)):
             corrected = read_corrected_targets(targets, joints)

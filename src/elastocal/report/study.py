@@ -369,20 +369,27 @@ def _list_estimators(table: pd.DataFrame, configurations: int) -> list[dict[str,
             if usual[fixed[0]] == usual[k_sigma]:
                 continue
             name = f"{name} (estimator: {first})"
-        cells_by_average = {
-            average: _format_medians(row, quantities, configurations)
-            for average, row in by_average.items()
-        }
-        fixed_cells = _format_medians(usual, fixed, configurations)
         rows.append(
             {
                 "robot": robot,
                 "strategy": name,
-                **cells_by_average,
-                "fixed": fixed_cells,
+                "fixed": _format_medians(usual, fixed, configurations),
+                **_format_by_average(by_average, quantities, configurations),
             }
         )
     return rows
+
+
+def _format_by_average(
+    by_average: Mapping[str, Mapping[str, Any]],
+    quantities: Sequence[str],
+    configurations: int,
+) -> dict[str, Any]:
+    """Format the quantities of an estimator by what is averaged."""
+    return {
+        average: _format_medians(row, quantities, configurations)
+        for average, row in by_average.items()
+    }
 
 
 def _format_medians(row: Row, names: Sequence[str], configurations: int) -> list[str]:

@@ -398,8 +398,9 @@ def fit_two_joints(
         geometric, by_pair = np.split(coefficients, [jacobian.shape[1]])
         return queries.jacobian @ geometric + columns @ by_pair
 
-    law = partial(_express_pair, coefficients, best_pair, len(joints))
-    yield Predictor(mean, law=law)
+    yield Predictor(
+        mean, law=partial(_express_pair, coefficients, best_pair, len(joints))
+    )
 
 
 def _express_pair(

@@ -17,6 +17,7 @@ import pandas as pd
 
 from elastocal.io.data_frames import read_robot_tables
 from elastocal.study.jobs import MICRO, MILLI, Job, write_csvs
+from elastocal.study.joint_test import pivot_studies
 from elastocal.study.metrics import extrapolate_length
 from elastocal.study.points import QUANTILE
 from elastocal.study.schemas import REPEATED
@@ -102,12 +103,7 @@ class StudyScores:
     @classmethod
     def of_studies(cls, studies: pd.DataFrame, length: int) -> StudyScores:
         """Arrange the rows of the table of repeated studies."""
-        groups = studies.groupby(["robot", "strategy"], sort=False)
-        cells = {
-            (str(robot), str(strategy)): cell.pivot(index="study", columns="length")
-            for (robot, strategy), cell in groups
-        }
-        return cls(cells, length)
+        return cls(pivot_studies(studies), length)
 
     @property
     def count(self) -> int:
@@ -140,13 +136,13 @@ class StudyScores:
         the robot where it is smaller."""
         leads = []
         for robot in ROBOTS:
-            own = self.get(robot, strategy, score)
-            others = [
-                self.get(robot, other, score)
-                for other in self.strategies
-                if other not in (COMB, STAGED_COMB)
+            of_further_estimators = [
+                self.get(robot, name, score)
+                for name in self.strategies
+                if name not in (COMB, STAGED_COMB)
             ]
-            leads.append(np.min(others, axis=0) / own)
+            smallest = np.min(of_further_estimators, axis=0)
+            leads.append(smallest / self.get(robot, strategy, score))
         return np.min(leads, axis=0)
 
 

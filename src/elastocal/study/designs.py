@@ -135,12 +135,12 @@ def _draw_candidates(
     size = np.abs(regressors).max(axis=(0, 1))
     observable = size > _SMALLEST_OBSERVABLE_SHARE * size.max()
     judged = study if observable.all() else loaded
-    others = judged.draw_experiments([0], study.size.tests, "criterion of designs")
+    criterion = judged.draw_experiments([0], study.size.tests, "criterion of designs")
     return Candidates(
         regressors,
         loaded.compute_deflections(experiments)[0, :, :rows],
         observable,
-        judged.validate_on(others).mean_form,
+        judged.validate_on(criterion).mean_form,
         judged.validate_on(judged.draw_tests()).mean_form,
     )
 

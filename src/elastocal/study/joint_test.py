@@ -95,6 +95,16 @@ def list_tested_figures(printed: pd.DataFrame) -> pd.DataFrame:
     return printed[printed.table.isin(["2", "3", "4"]) & ~is_fitted]
 
 
+def pivot_studies(studies: pd.DataFrame) -> dict[tuple[str, str], pd.DataFrame]:
+    """Arrange the table of repeated studies by robot and strategy: a row for each study,
+    and a column for each score and length."""
+    groups = studies.groupby(["robot", "strategy"], sort=False)
+    return {
+        (str(robot), str(strategy)): cell.pivot(index="study", columns="length")
+        for (robot, strategy), cell in groups
+    }
+
+
 def collect_study_values(
     figures: pd.DataFrame,
     studies: pd.DataFrame,
@@ -121,18 +131,15 @@ def collect_study_values(
     """
     numbers = np.unique(studies.study)
     values = np.full((len(numbers), len(figures)), np.nan)
-    cells = {
-        key: cell.pivot(index="study", columns="length")
-        for key, cell in studies.groupby(["robot", "strategy"], sort=False)
-    }
+    cells = pivot_studies(studies)
     figure: Any
     for index, figure in enumerate(figures.itertuples()):
         cell = cells.get((figure.robot, figure.strategy))
         if figure.table == "2" and figure.robot in initial:
             statistics = compute_statistics(initial[figure.robot])
             by_set = statistics[figure.quantity.removeprefix("deviation_")]
-            found = MILLI * by_set.to_numpy()[: len(numbers)]
-            values[: len(found), index] = found
+            of_studies = MILLI * by_set.to_numpy()[: len(numbers)]
+            values[: len(of_studies), index] = of_studies
         elif figure.table != "2" and cell is not None:
             values[:, index] = _read_quantity(cell, figure.quantity, reading)
     return values

@@ -25,7 +25,6 @@ from elastocal.study.in_memory import load_study
 from elastocal.study.jobs import (
     Job,
     collect_provenance,
-    load_strategies,
     read_frames,
     read_printed_figures,
     write_csvs,
@@ -37,7 +36,7 @@ from elastocal.study.joint_test import (
     list_tested_figures,
 )
 from elastocal.study.metrics import extrapolate_first_length
-from elastocal.study.repeated import evaluate_studies
+from elastocal.study.repeated import write_studies
 from elastocal.study.schemas import INITIAL, REPEATED
 from elastocal.study.simulation import summarize_displacements
 
@@ -131,16 +130,16 @@ def build_multiverse_table(
     rows = []
     all_ours = _collect(printed, usual)
     for universe in others:
-        other = _collect(printed, universe)
-        ours = all_ours[: len(other)]
-        covered = ~(np.isnan(other) | np.isnan(ours)).any(axis=0)
+        alternative = _collect(printed, universe)
+        ours = all_ours[: len(alternative)]
+        covered = ~(np.isnan(alternative) | np.isnan(ours)).any(axis=0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            change = 100 * (np.median(other / ours, axis=0) - 1)
+            change = 100 * (np.median(alternative / ours, axis=0) - 1)
         figure: Any
         for index, figure in enumerate(printed.itertuples()):
             if covered[index]:
                 heads = [getattr(figure, name) for name in _HEADS]
-                medians = [float(np.median(v[:, index])) for v in (ours, other)]
+                medians = [float(np.median(v[:, index])) for v in (ours, alternative)]
                 rows.append(
                     (universe.number, *heads, figure.value, *medians, change[index])
                 )
@@ -191,12 +190,7 @@ def evaluate_alternative(job: Job) -> None:
     """Evaluate the first further studies of one robot under another interpretation, and
     its deflections before calibration."""
     study = load_study(job)
-    blocks = evaluate_studies(
-        study, range(1, job.params.studies + 1), load_strategies(job)
-    )
-    origin = collect_provenance(job)
-    schema = REPEATED.for_joints(study.robot.joints)
-    write_table(job.output.repeated, schema, blocks, origin)
+    write_studies(job, study)
     sets = np.arange(_TABLE2_SETS)
     experiments = study.draw_experiments(sets)
     deflections = study.compute_deflections(experiments)
@@ -205,7 +199,7 @@ def evaluate_alternative(job: Job) -> None:
         "configurations": np.full(len(sets), deflections.shape[1]),
         **summarize_displacements(deflections),
     }
-    write_table(job.output.initial, INITIAL, [columns], origin)
+    write_table(job.output.initial, INITIAL, [columns], collect_provenance(job))
 
 
 def tabulate_multiverse(job: Job) -> None:
@@ -219,13 +213,13 @@ def tabulate_multiverse(job: Job) -> None:
         read_frames(job, job.input.initial, INITIAL),
         reading,
     )
-    others = []
+    alternatives = []
     # The files have the order of the interpretations and their robots.
     files = zip(job.input.alternatives, job.input.alternatives_initial, strict=True)
     for number, robots in params.alternatives.items():
         studies, initial = zip(*(next(files) for _ in robots), strict=True)
         frames = [read_frame(path, INITIAL) for path in initial]
-        others.append(
+        alternatives.append(
             Universe(
                 number,
                 read_robot_tables(studies, REPEATED),
@@ -233,6 +227,8 @@ def tabulate_multiverse(job: Job) -> None:
                 reading,
             )
         )
-    table = build_multiverse_table(printed, usual, [*others, *list_scorings(usual)])
+    table = build_multiverse_table(
+        printed, usual, [*alternatives, *list_scorings(usual)]
+    )
     interpretations = pd.read_csv(job.input.interpretations)
     write_csvs(job, table=table, summary=summarize_multiverse(table, interpretations))

@@ -95,8 +95,9 @@ class PrefixEquations:
                 else:
                     factor[joint, column] = element * factor[column, column]
             value = self.right_side[joint].copy()
-            for other, error in fixed.items():
-                value -= self.matrix[max(joint, other), min(joint, other)] * error
+            for known_joint, error in fixed.items():
+                pair = (max(joint, known_joint), min(joint, known_joint))
+                value -= self.matrix[pair] * error
             for earlier in before:
                 value -= factor[joint, earlier] * reduced[earlier]
             reduced[joint] = value * factor[joint, joint]
@@ -157,8 +158,8 @@ def _sum_over_prefixes(
     pairs = [pair for pair in product(columns, columns) if pair[1] <= pair[0]]
     sums = np.empty((len(pairs) + len(columns), *noise.shape[1:]))
     factors = [
-        (columns[joint], columns[other], scale[joint] * scale[other])
-        for joint, other in pairs
+        (columns[larger], columns[smaller], scale[larger] * scale[smaller])
+        for larger, smaller in pairs
     ]
     factors += [(column, noise, scale[joint]) for joint, column in columns.items()]
     for element, (first, second, factor) in zip(sums, factors, strict=True):
@@ -342,7 +343,11 @@ def _score_study(
 
 def repeat_studies(job: Job) -> None:
     """Evaluate further studies of one robot."""
-    study = load_study(job)
+    write_studies(job, load_study(job))
+
+
+def write_studies(job: Job, study: StudyInMemory) -> None:
+    """Evaluate the first further studies of a robot, and write their scores."""
     blocks = evaluate_studies(
         study, range(1, job.params.studies + 1), load_strategies(job)
     )

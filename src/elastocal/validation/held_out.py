@@ -358,9 +358,33 @@ def predict_left_out_residuals(
     -------
     (M, rows) array, measured minus predicted, m and rad, base axes
     """
-    residual = fitted.whiten(fitted.residual)
     variance, axes = np.linalg.eigh(fitted.covariance)
     covariance_root = axes * np.sqrt(np.maximum(variance, 0.0))
+    gram, gradient, blocks = _sum_by_group(fitted, observations, group, covariance_root)
+    changes = map(_solve_without, gram, gradient)
+    steps = np.array([covariance_root @ change for change in changes])
+    left_out = fitted.residual.copy()
+    for indices, plain in blocks:
+        left_out[indices] += (plain @ steps[group[indices], :, None])[..., 0]
+    return left_out
+
+
+def _sum_by_group(
+    fitted: Fit,
+    observations: Observations,
+    group: np.ndarray,
+    covariance_root: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, list[tuple[slice, np.ndarray]]]:
+    """Sum the products of whitened sensitivities over each of G groups, for P parameters
+    in units of a root of their covariance.
+
+    Returns
+    -------
+    gram : (G, P, P), products with each other
+    gradient : (G, P), products with the whitened residual
+    blocks : observations of each block, and their sensitivities without whitening
+    """
+    residual = fitted.whiten(fitted.residual)
     parameters = len(covariance_root)
     gram = np.zeros((group.max() + 1, parameters, parameters))
     gradient = np.zeros((len(gram), parameters))
@@ -374,12 +398,7 @@ def predict_left_out_residuals(
             rows = scaled[members].reshape(of_group.size, parameters)
             gram[number] += rows.T @ rows
             gradient[number] += rows.T @ of_group
-    changes = map(_solve_without, gram, gradient)
-    steps = np.array([covariance_root @ change for change in changes])
-    left_out = fitted.residual.copy()
-    for indices, plain in blocks:
-        left_out[indices] += (plain @ steps[group[indices], :, None])[..., 0]
-    return left_out
+    return gram, gradient, blocks
 
 
 def _solve_without(gram: np.ndarray, gradient: np.ndarray) -> np.ndarray:

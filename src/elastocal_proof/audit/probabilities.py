@@ -268,8 +268,8 @@ class TracedEvidence:
         squares = []
         for group in (in_group, ~in_group):
             made = at_rest[:, group] @ coefficients[group]
-            of_rivals = at_rest[:, ~group] * deviations[~group]
-            unexplained = _solve_covariance(of_rivals, made)
+            of_complement = at_rest[:, ~group] * deviations[~group]
+            unexplained = _solve_covariance(of_complement, made)
             squares.append((float(made @ made), float(made @ unexplained)))
         return squares
 
