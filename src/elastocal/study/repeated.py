@@ -238,9 +238,12 @@ def average_study(
     sums = {estimator.stages: _Sums() for estimator in estimators}
     for first in range(0, count, _SETS_PER_BLOCK):
         sets = numbers[first : first + _SETS_PER_BLOCK]
-        errors_by_stages = _estimate_block(study, estimators, sets)
-        for stages, errors in errors_by_stages.items():
-            sums[stages].add(errors, study.robot.compliance, validation)
+        # The matrix of a prefix has no factor if the prefix is too short, or if its
+        # points are too few: two positions of one body determine five of six numbers.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            errors_by_stages = _estimate_block(study, estimators, sets)
+            for stages, errors in errors_by_stages.items():
+                sums[stages].add(errors, study.robot.compliance, validation)
     return {
         stages: total.average(study.robot.compliance, count)
         for stages, total in sums.items()
@@ -256,9 +259,7 @@ def _estimate_block(
     equations = form_prefix_equations(study, sets, [*points])
     errors_by_stages = {}
     for estimator in estimators:
-        # The matrix of a prefix that is too short has no factor.
-        with np.errstate(divide="ignore", invalid="ignore"):
-            errors = estimate_errors(estimator, equations, study.robot.joints)
+        errors = estimate_errors(estimator, equations, study.robot.joints)
         first = find_first_solvable_length(estimator, study.interpretation.rows)
         errors[:, : first - 1] = np.nan
         errors_by_stages[estimator.stages] = errors
