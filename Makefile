@@ -5,10 +5,14 @@ CORES ?= 2
 # The pins have every dependency, so none is looked for; compiled once, since an environment may forbid programs to do it as they run.
 INSTALL = $(BIN)/uv pip install -q --system-certs --compile-bytecode --python $(BIN)/python
 
-.PHONY: paper study proof audit test test-slow test-slurm fuzz soak mutants lint catalogue bench pictures site supply dist installed lock clean
+.PHONY: paper cameras study proof audit test test-slow test-slurm fuzz soak mutants lint catalogue bench pictures site supply dist installed lock clean
 
 paper: .venv/ready
 	$(BIN)/snakemake -j$(CORES)
+
+# Two robots without a laser tracker: a printed tool, and a camera with a board.
+cameras: .venv/ready
+	$(BIN)/snakemake -j$(CORES) cameras
 
 # Further questions, repeated studies and designs, with the report of the study.
 study: .venv/ready

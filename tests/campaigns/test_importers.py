@@ -332,20 +332,42 @@ def test_each_pose_of_the_motoman_counts_once_and_poses_without_images_do_not_co
     )
 
 
+def test_files_of_sockets_become_a_campaign_of_the_last_joint(tmp_path):
+    importer = IMPORTERS["mukca_panda"]
+    paths = [tmp_path / "front" / f"hole_{socket}.csv" for socket in (0, 1)]
+    paths[0].parent.mkdir()
+    for path in paths:
+        angles = np.random.default_rng(1).uniform(-1, 1, (12, 7))
+        np.savetxt(path, angles, delimiter=",")
+    folder = tmp_path / "mine"
+    importer.write_campaign(
+        paths, folder, ROBOTS, "mine", holdout={"fraction": 0.3, "seed": 1}
+    )
+    campaign = read_campaign(read_campaign_folder(folder, ROBOTS))
+    np.testing.assert_array_equal(
+        campaign.measurements.position[:, 0], np.repeat([0, 0.05], 12)
+    )
+    assert campaign.robot.joints == 7
+    with refused(paths[0], "", "joint angles alone"):
+        importer.read(paths[0])
+
+
 def test_the_campaigns_of_the_repository_are_read(config, config_folder):
     sources = read_campaign_sources(config, config_folder)
     assert list(sources) == list_campaigns(config)
     for name, document in sources.items():
-        assert document["source"] == (
-            "simulated" if name in config["loop"]["campaigns"] else "public"
-        )
+        expected = {"public", "included"}
+        if name in config["loop"]["campaigns"]:
+            expected = {"simulated"}
+        assert document["source"] in expected
         assert ("robot_document" in document) == (document["source"] == "simulated")
 
 
 def keep_one_campaign(config, name="mine"):
     """Return a configuration with one campaign and no data of the benchmark."""
+    no_others = dict.fromkeys(("campaigns", "measured", "cameras", "sockets"), ())
     return config | {
-        "loop": config["loop"] | {"main": [name], "campaigns": [], "measured": []},
+        "loop": config["loop"] | {"main": [name]} | no_others,
         "league": config["league"] | {"data": {"all": {}}},
     }
 
@@ -360,7 +382,7 @@ def keep_one_campaign(config, name="mine"):
             "importer",
             [
                 "'mine'",
-                "fanuc_static, fanuc_cpa, fanuc_joint, jacobi, motoman, ur10_ipa",
+                "fanuc_static, fanuc_cpa, fanuc_joint, jacobi, motoman, ur10_ipa,",
             ],
         ),
     ],

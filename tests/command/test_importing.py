@@ -1,11 +1,17 @@
 """`elastocal import`: robot files from URDF and from DH tables, and the table of another
 program as measurements.csv."""
 
+import itertools
+
+import numpy as np
 import pytest
 import yaml
+from made_boards import PANDA, make_board_poses
 from made_urdf import joint, link, written
+from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.reading import read_robot
+from elastocal.campaigns.campaign_folder import read_campaign_folder
+from elastocal.campaigns.reading import read_campaign, read_robot
 
 ARM = (
     link("base"),
@@ -190,3 +196,46 @@ def test_joint_angles_come_from_a_file_of_their_own(elastocal, refusal, tmp_path
     rows = (tmp_path / "cell" / "measurements.csv").read_text().splitlines()
     assert rows[1].split(",")[4].startswith("0.349")
     assert "--joints FILE" in refusal("import", "csv", joints, "--folder", tmp_path)
+
+
+def write_sockets(folder, poses=6):
+    """Write recordings of a ball in two sockets at two places."""
+    rng = np.random.default_rng(1)
+    for place, socket in itertools.product(("front", "left"), (0, 1)):
+        (folder / place).mkdir(parents=True, exist_ok=True)
+        angles = rng.uniform(-1, 1, (poses, 7))
+        np.savetxt(folder / place / f"hole_{socket}.csv", angles, delimiter=",")
+    return folder
+
+
+def test_recordings_in_sockets_become_a_campaign_that_can_be_read(
+    elastocal, refusal, tmp_path
+):
+    folder = tmp_path / "arm"
+    command = ("import", "sockets", write_sockets(tmp_path / "panda_1"))
+    command += ("--folder", folder, "--robot", PANDA)
+    result = elastocal(*command, "--distance", "0.06")
+    assert result.exit_code == 0, result.exception
+    assert "24 poses in 4 sockets at 2 places, 60 mm apart" in result.output
+    campaign = read_campaign(read_campaign_folder(folder, PANDA.parent))
+    assert campaign.measurements.position[:, 0].max() == 0.06
+    assert "that are there already" in refusal(*command)
+    assert elastocal(*command, "--force").exit_code == 0
+    assert "less than 1 m" in refusal(*command, "--force", "--distance", "50")
+
+
+def test_poses_of_a_board_become_a_campaign_that_can_be_read(
+    elastocal, refusal, tmp_path
+):
+    angles, rotation, position = make_board_poses()
+    path = tmp_path / "calib.npz"
+    vectors = Rotation.from_matrix(rotation).as_rotvec()
+    np.savez(path, rvecs=vectors, tvecs=position, q=angles)
+    folder = tmp_path / "arm"
+    command = ("import", "board", path, "--folder", folder)
+    assert "no robot file" in refusal(*command)
+    result = elastocal(*command, "--robot", PANDA, "--camera", "beside-robot")
+    assert result.exit_code == 0, result.exception
+    assert "12 poses of a board, camera beside-robot" in result.output
+    campaign = read_campaign(read_campaign_folder(folder, PANDA.parent))
+    np.testing.assert_array_equal(campaign.measurements.position, position)

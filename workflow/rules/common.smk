@@ -373,6 +373,11 @@ def files_of_campaign(campaign):
     return files + expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=declared)
 
 
+def included_folder(wildcards):
+    """Return the folder of a campaign that comes with the project."""
+    return f"{INCLUDED_DATA}/{SOURCES[wildcards.campaign]['folder']}"
+
+
 def robots_of_import(wildcards):
     """Return the files of the robots that an importer reads or names."""
     source = find_importer(
@@ -426,6 +431,7 @@ AUDITED_TOO = {
     "study": "reports/study.pdf",
     "loop": "reports/loop/campaigns.csv",
     "measured": "reports/loop/measured.csv",
+    "cameras": "reports/loop/cameras.csv",
     "league": "reports/league/all/league.csv",
     "league_small": "reports/league/small/league.csv",
     "blind": "reports/blind/summary.csv",

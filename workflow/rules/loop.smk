@@ -5,7 +5,8 @@ results/loop/{campaign}/, a table for each step, and reports/loop/{campaign}/. N
 """
 
 SIMULATED = [name for name, source in SOURCES.items() if source["source"] == "simulated"]
-PUBLIC = [name for name in SOURCES if name not in SIMULATED]
+INCLUDED = [name for name, source in SOURCES.items() if source["source"] == "included"]
+PUBLIC = [name for name in SOURCES if name not in [*SIMULATED, *INCLUDED]]
 # Figures of a campaign, with their titles in `snakemake --report`.
 LOOP_FIGURES = {
     "before_after": "Errors before and after",
@@ -52,6 +53,20 @@ rule import_campaign:
         box=INCLUDED_DATA,
     script:
         "../scripts/import_campaign.py"
+
+
+rule copy_included_campaign:
+    output:
+        document="data/campaigns/{campaign}/campaign.yaml",
+        measurements="data/campaigns/{campaign}/measurements.parquet",
+    wildcard_constraints:
+        campaign="|".join(INCLUDED) or "none",
+    params:
+        source=lambda wildcards: SOURCES[wildcards.campaign],
+        folder=included_folder,
+        document_sha256=lambda wildcards: digest_of([f"{included_folder(wildcards)}/campaign.yaml"]),
+    script:
+        "../scripts/copy_included_campaign.py"
 
 
 rule read_campaign:
@@ -131,7 +146,7 @@ rule summarize_campaigns:
             kind="table",
         ),
     wildcard_constraints:
-        kind="campaigns|main|measured",
+        kind="campaigns|main|measured|cameras|sockets",
     params:
         step="elastocal.loop.summary.summarize_campaigns",
         campaigns=lambda wildcards: config["loop"][wildcards.kind],
@@ -155,7 +170,7 @@ rule draw_campaign_errors:
             kind="figure",
         ),
     wildcard_constraints:
-        kind="campaigns|measured",
+        kind="campaigns|measured|cameras|sockets",
     script:
         "../scripts/draw_campaign_errors.py"
 
@@ -181,3 +196,22 @@ rule measured:
         "reports/loop/measured.csv",
         "reports/loop/measured.png",
         lambda wildcards: files_behind(rules.measured.input),
+
+
+# Campaigns of a printed tool and of a camera, whose data come with this repository.
+rule cameras:
+    input:
+        loop_reports(config["loop"]["cameras"]),
+        "reports/loop/cameras.csv",
+        "reports/loop/cameras.png",
+        lambda wildcards: files_behind(rules.cameras.input),
+
+
+# All Pandas of the source of the printed tool, which are fetched, and the camera with
+# other held-out poses.
+rule sockets:
+    input:
+        loop_reports(config["loop"]["sockets"]),
+        "reports/loop/sockets.csv",
+        "reports/loop/sockets.png",
+        lambda wildcards: files_behind(rules.sockets.input),

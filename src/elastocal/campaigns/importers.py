@@ -27,6 +27,12 @@ from elastocal.campaigns.campaign_folder import (
 )
 from elastocal.campaigns.holdout import number_close_points
 from elastocal.campaigns.reading import read_robot
+from elastocal.campaigns.socket_recordings import (
+    SOCKET_DISTANCE_M,
+    describe_sockets,
+    read_recording,
+    tabulate_recordings,
+)
 from elastocal.campaigns.writing import write_campaign
 from elastocal.errors import InputError
 from elastocal.io.documents import (
@@ -148,11 +154,12 @@ def fetch(
     import pooch
 
     pooch.get_logger().setLevel(logging.ERROR)
-    download = _name_download(name, file)
+    # The name of a file may have folders.
+    download = Path(folder, _name_download(name, file))
+    known_hash = f"sha256:{file.sha256}"
     try:
-        return Path(
-            pooch.retrieve(file.address, f"sha256:{file.sha256}", download, folder)
-        )
+        path = pooch.retrieve(file.address, known_hash, download.name, download.parent)
+        return Path(path)
     except ValueError as error:
         finding = f"other contents ({error})"
         allowed = f"SHA-256 {file.sha256}"
@@ -350,6 +357,35 @@ class Importer:
         )
 
 
+@dataclass(frozen=True)
+class SocketImporter(Importer):
+    """Writes campaigns of a ball in printed sockets, from files of joint angles.
+
+    Attributes
+    ----------
+    distance_m : distance between the centres of neighbouring sockets.
+    """
+
+    distance_m: float = SOCKET_DISTANCE_M
+
+    def write_campaign(
+        self,
+        paths: Sequence[str | Path],
+        folder: str | Path,
+        robots_folder: str | Path,
+        name: str,
+        **test: Mapping[str, Any],
+    ) -> None:
+        """Write files of one robot as a campaign's folder, each folder of them as a
+        session; see `Importer.write_campaign`."""
+        recordings = [read_recording(path) for path in paths]
+        table = tabulate_recordings(recordings, self.distance_m)
+        joints = recordings[0].angles.shape[1]
+        document = describe_sockets(name, self.robots[0], joints)
+        document |= {key: dict(value) for key, value in test.items()}
+        write_campaign(folder, document, table, joints)
+
+
 def _tabulate(
     measured: PublicMeasurements, same_pose_rad: float
 ) -> dict[str, np.ndarray]:
@@ -407,9 +443,19 @@ def read_importers(path: Path) -> dict[str, Importer]:
         options = {
             key: entry[key] for key in ("noise", "same_pose_rad") if key in entry
         }
+        if "sockets" in entry:
+            importers[name] = SocketImporter(
+                files, _refuse_table, tuple(robots), **options, **entry["sockets"]
+            )
+            continue
         read = _find_reader(name, entry, parts, path)
         importers[name] = Importer(files, read, tuple(robots), **options, parts=parts)
     return importers
+
+
+def _refuse_table(path: str | Path) -> PublicMeasurements:
+    """Refuse a recording where measured positions are asked for: an InputError."""
+    raise InputError(path, "", "joint angles alone", "a table with measured positions")
 
 
 def _find_reader(
@@ -464,7 +510,7 @@ def read_campaign_sources(
         path = locate_document(folder, "campaigns", name)
         if document["source"] == "public":
             find_importer(document["importer"], folder, path)
-        else:
+        elif document["source"] == "simulated":
             document["robot_document"] = read_named_document(
                 folder, "robots", "robot", document["robot"], path
             )
@@ -477,10 +523,10 @@ def read_campaign_sources(
 
 def list_campaigns(config: Mapping[str, Any]) -> list[str]:
     """List the campaigns that a configuration names, each once: simulated, measured, of
-    the default run and of the league."""
+    the default run, without a laser tracker, and of the league."""
     names = []
-    for key in ("campaigns", "measured", "main"):
-        names += config["loop"][key]
+    for key in ("campaigns", "measured", "main", "cameras", "sockets"):
+        names += config["loop"].get(key, ())
     return list(dict.fromkeys([*names, *list_league_data(config)]))
 
 

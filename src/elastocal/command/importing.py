@@ -4,7 +4,7 @@ reads."""
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from typer import Argument, Option
@@ -29,17 +29,24 @@ from elastocal.counting import format_count
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from elastocal.exchange.measurement_table import ImportedMeasurements, OtherFile
     from elastocal.exchange.robot_text import ImportedRobot
+    from elastocal.mechanics.robot import Robot
 
 importing = typer.Typer(name="import", no_args_is_help=True)
 _Output = Annotated[Path, Option("--output", "-o", help="The robot file to write.")]
+# Robot file in the folder of a campaign.
+_ROBOT_FILE = "robot.yaml"
+# A printed tool is smaller; a larger number is in millimetres.
+_LARGEST_DISTANCE_M = 1.0
 _Force = Annotated[bool, Option("--force", help="Replace the file that is there.")]
 
 
 @importing.callback()
 def import_() -> None:
-    """Import a robot (URDF, DH table) or measurements (CSV)."""
+    """Import a robot (URDF, DH table) or measurements (CSV, printed sockets, a board)."""
 
 
 @importing.command(
@@ -268,6 +275,169 @@ def csv(
         robot_file = robot_file or Path("robot.yaml")
         next_step = format_command("init", folder, "--robot", robot_file)
     print_lines([*lines, f"next: {next_step}"], Console())
+
+
+@importing.command(
+    epilog=format_example(
+        "elastocal import sockets data/panda_1 --folder campaigns/arm --robot robot.yaml"
+    )
+)
+def sockets(
+    recordings: Annotated[
+        Path,
+        Argument(
+            help="Folder with a folder for each place of the printed tool, and in it a"
+            " file hole_0.csv, hole_1.csv … of joint angles for each socket."
+        ),
+    ],
+    *,
+    folder: Annotated[Path, Option(help="Folder of the campaign.")],
+    distance: Annotated[
+        float, Option(help="Distance between the centres of neighbouring sockets, m.")
+    ] = 0.05,
+    robot: Annotated[
+        Path | None, Option(help="Robot file to copy there, where there is none.")
+    ] = None,
+    force: Annotated[
+        bool, Option("--force", help="Replace a campaign that is there.")
+    ] = False,
+) -> None:
+    """Make a campaign of a ball in printed sockets (MUKCa): joint angles alone.
+
+    Each place of the tool is a session with a frame of its own. Files of poses that the
+    controller computed, hole_0_pose.csv, are left aside.
+    """
+    from elastocal.campaigns.socket_recordings import (
+        describe_sockets,
+        find_recordings,
+        read_recording,
+        tabulate_recordings,
+    )
+
+    _refuse_distance(distance)
+    arm = _read_robot_for(folder, robot, force=force)
+    paths = find_recordings(recordings)
+    files = [read_recording(path) for path in paths]
+    table = tabulate_recordings(files, distance)
+    document = describe_sockets(folder.resolve().name, _ROBOT_FILE, arm.joints)
+    places = len({recording.place for recording in files})
+    size = (
+        f"{format_count(len(table['pose']), 'pose')} in {format_count(len(paths), 'socket')}"
+        f" at {format_count(places, 'place')}, {1e3 * distance:g} mm apart"
+    )
+    _write_campaign_folder(folder, document, table, arm.joints, robot, [size])
+
+
+@importing.command(
+    epilog=format_example(
+        "elastocal import board samples.yaml --joints joints.yaml --folder campaigns/arm"
+    )
+)
+def board(
+    file: Annotated[
+        Path,
+        Argument(
+            help="Samples of MoveIt or easy_handeye (YAML), arrays rvecs and tvecs of"
+            " OpenCV (.npz), or data of robot_calibration (CSV of its bag)."
+        ),
+    ],
+    *,
+    folder: Annotated[Path, Option(help="Folder of the campaign.")],
+    joints: Annotated[
+        Path | None,
+        Option(
+            help="File of joint angles, a row for each sample: a table, or MoveIt's."
+        ),
+    ] = None,
+    camera: Annotated[
+        Literal["on-robot", "beside-robot"],
+        Option(help="Where the camera is; the board is at the other place."),
+    ] = "on-robot",
+    angles: AnglesOption = None,
+    lengths: Annotated[
+        Literal["m", "mm"], Option(help="Unit of the board's positions.")
+    ] = "m",
+    sensor: Annotated[
+        str, Option(help="Camera among the sensors of robot_calibration.")
+    ] = "camera",
+    robot: Annotated[
+        Path | None, Option(help="Robot file to copy there, where there is none.")
+    ] = None,
+    force: Annotated[
+        bool, Option("--force", help="Replace a campaign that is there.")
+    ] = False,
+) -> None:
+    """Make a campaign of poses of a board that a camera saw.
+
+    Which program wrote the file is found out. Poses are those of the board in the
+    camera's optical frame; the robot's own poses in the file are not used, because they
+    have the robot's error.
+    """
+    from elastocal.exchange.board_poses import (
+        describe_board_campaign,
+        tabulate_board_poses,
+    )
+    from elastocal.exchange.board_programs import BoardOptions, read_board_poses
+
+    arm = _read_robot_for(folder, robot, force=force)
+    options = BoardOptions(joints, angles, lengths, sensor)
+    poses = read_board_poses(file, arm, options)
+    table = tabulate_board_poses(poses, camera)
+    document = describe_board_campaign(folder.resolve().name, arm.joints, camera)
+    size = f"{format_count(len(table['pose']), 'pose')} of a board, camera {camera}"
+    _write_campaign_folder(folder, document, table, arm.joints, robot, [size])
+
+
+def _refuse_distance(distance: float) -> None:
+    """Refuse a distance that no printed tool has, such as one in millimetres."""
+    if not 0.0 < distance < _LARGEST_DISTANCE_M:
+        allowed = f"more than 0 and less than {_LARGEST_DISTANCE_M:g} m"
+        raise InputError("--distance", "", f"{distance:g}", allowed)
+
+
+def _read_robot_for(folder: Path, robot: Path | None, *, force: bool) -> Robot:
+    """Read the robot of a new campaign, and refuse a campaign that is there already."""
+    from elastocal.campaigns.campaign import DOCUMENT
+    from elastocal.campaigns.campaign_folder import check_campaign_name
+    from elastocal.campaigns.reading import read_robot
+    from elastocal.io.atomic_writes import check_places
+
+    check_campaign_name(folder)
+    check_places(folder / DOCUMENT, folder / _ROBOT_FILE)
+    _check_replaceable(folder, force=force)
+    if (folder / DOCUMENT).exists() and not force:
+        found = "a campaign that is there already"
+        raise InputError(folder / DOCUMENT, "", found, "another folder, or --force")
+    file = robot or folder / _ROBOT_FILE
+    if not file.is_file():
+        allowed = "--robot FILE; elastocal import urdf makes one"
+        raise InputError(file, "", "no robot file", allowed)
+    return read_robot(file)
+
+
+def _write_campaign_folder(
+    folder: Path,
+    document: dict[str, Any],
+    table: dict[str, np.ndarray],
+    joints: int,
+    robot: Path | None,
+    lines: list[str],
+) -> None:
+    """Write a campaign with its robot file, and print what was read."""
+    from rich.console import Console
+
+    from elastocal.campaigns.writing import write_campaign
+    from elastocal.io.atomic_writes import write_text
+    from elastocal.io.documents import LARGEST_BYTES
+    from elastocal.io.texts import read_text
+
+    if robot is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_text(folder / _ROBOT_FILE, read_text(robot, LARGEST_BYTES))
+    write_campaign(folder, document, table, joints, kind="csv")
+    next_step = format_command("check", folder)
+    written = f"written: {folder.as_posix()}, campaign.yaml and measurements.csv"
+    print_lines([*lines, written, f"next: {next_step}"], Console())
 
 
 def _write_robot(result: ImportedRobot, output: Path) -> None:

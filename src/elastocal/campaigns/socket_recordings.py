@@ -1,0 +1,157 @@
+"""Joint angles that were recorded while a ball on the robot sat in printed sockets.
+
+This is the format of MUKCa [1]_: a folder for each place where the printed tool stood,
+with a file of joint angles for each of its sockets. Nothing else is measured. Each place
+has a frame of its own, with the first socket in its origin and the others on its x axis.
+
+References
+----------
+.. [1] Franzese, Spahn, Kober and Della Santina, MUKCa: accurate and affordable cobot
+   calibration without external measurement devices, arXiv:2503.12584, 2025.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from elastocal.errors import InputError
+
+# Distance of neighbouring sockets of the tool that MUKCa prints.
+SOCKET_DISTANCE_M = 0.05
+TARGET = "ball"
+# Play of a printed ball in a printed socket; MUKCa reports 0.1 mm of repeatability.
+SOCKET_STD_M = 1.0e-4
+# Name of a file of joint angles, with the number of its socket.
+_SOCKET_FILE = re.compile(r"hole_(\d)\.csv")
+_SOCKET_PATTERN = "hole_*.csv"
+_ALLOWED_FILE = "joint angles in rad separated by commas, one line for each pose"
+# No joint turns further, so that a larger number is an angle in degrees.
+_LARGEST_ANGLE_RAD = 4 * np.pi
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Poses in which the ball was in one socket.
+
+    Attributes
+    ----------
+    place : where the tool stood.
+    socket : number of the socket, from 0.
+    angles : (N, n) joint angles as the controller reported them, rad.
+    """
+
+    place: str
+    socket: int
+    angles: np.ndarray
+
+
+def read_recording(path: str | Path) -> Recording:
+    """Read a file of joint angles; its folder names the place.
+
+    Raises `InputError`: the name states no socket, or the file is not such a table.
+    """
+    path = Path(path)
+    match = _SOCKET_FILE.fullmatch(path.name)
+    if match is None:
+        allowed = "hole_0.csv, hole_1.csv and so on, numbered by socket"
+        raise InputError(path, "name", repr(path.name), allowed)
+    try:
+        angles = np.loadtxt(path, delimiter=",", ndmin=2)
+    except (ValueError, OSError) as error:
+        raise InputError(path, "", str(error), _ALLOWED_FILE) from None
+    if angles.size == 0:
+        raise InputError(path, "", "no line of joint angles", _ALLOWED_FILE)
+    wrong = ~np.isfinite(angles) | (np.abs(angles) > _LARGEST_ANGLE_RAD)
+    if wrong.any():
+        row, joint = np.argwhere(wrong)[0]
+        found = f"{angles[row, joint]:g} for joint {joint + 1}"
+        allowed = "an angle in rad of at most two turns"
+        raise InputError(path, f"row {row + 1}", found, allowed)
+    return Recording(path.parent.name, int(match[1]), angles)
+
+
+def find_recordings(folder: str | Path) -> list[Path]:
+    """Find the files of joint angles in a folder and in the folders below it.
+
+    Raises `InputError`: there is none.
+    """
+    paths = sorted(Path(folder).rglob(_SOCKET_PATTERN))
+    paths = [path for path in paths if _SOCKET_FILE.fullmatch(path.name)]
+    if not paths:
+        allowed = "a folder for each place of the tool, with hole_0.csv and hole_1.csv"
+        raise InputError(folder, "", f"no file {_SOCKET_PATTERN}", allowed)
+    return paths
+
+
+def describe_sockets(name: str, robot: str, joints: int) -> dict[str, Any]:
+    """Return ``campaign.yaml`` of recordings.
+
+    Parameters
+    ----------
+    name : name of the campaign.
+    robot : as in ``campaign.yaml``.
+    joints : number of joints; the ball sits behind the last one.
+    """
+    return {
+        "campaign": name,
+        "robot": robot,
+        "measured": "position",
+        "frame": "tracker",
+        "targets": {TARGET: {"point": f"{joints}DoF", "offset_m": "unknown"}},
+        "compliance": "nominal",
+        "declared": ["joint_offset", "link_geometry"],
+        "noise": {"position_m": SOCKET_STD_M},
+        "holdout": {"fraction": 0.3, "seed": 1},
+    }
+
+
+def tabulate_recordings(
+    recordings: Sequence[Recording], distance_m: float = SOCKET_DISTANCE_M
+) -> dict[str, np.ndarray]:
+    """Return the columns of ``measurements.csv``, one row for each recorded pose.
+
+    Parameters
+    ----------
+    recordings : all sockets of all places; a place is one session.
+    distance_m : distance between the centres of neighbouring sockets.
+
+    Raises
+    ------
+    InputError
+        If recordings have different numbers of joints, or a place has one socket twice.
+    """
+    joints = recordings[0].angles.shape[1]
+    places = list(dict.fromkeys(recording.place for recording in recordings))
+    seen = set()
+    columns: dict[str, list[np.ndarray]] = {"session": [], "x": [], "angles": []}
+    for recording in recordings:
+        label = (recording.place, recording.socket)
+        source = f"{recording.place}/hole_{recording.socket}.csv"
+        if recording.angles.shape[1] != joints:
+            found = f"{recording.angles.shape[1]} angles in a line"
+            raise InputError(source, "", found, f"{joints}, as in the first file")
+        if label in seen:
+            raise InputError(source, "", "the same socket twice", "each socket once")
+        seen.add(label)
+        count = len(recording.angles)
+        columns["session"].append(np.full(count, places.index(recording.place)))
+        columns["x"].append(np.full(count, recording.socket * distance_m))
+        columns["angles"].append(recording.angles)
+    angles = np.concatenate(columns["angles"])
+    poses = np.arange(len(angles))
+    table = {
+        "session": np.concatenate(columns["session"]),
+        "pose": poses,
+        "load": 0 * poses,
+        "repeat": 0 * poses,
+        "target": np.full(len(poses), TARGET),
+    }
+    table |= {f"q{joint}": column for joint, column in enumerate(angles.T, 1)}
+    zeros = np.zeros(len(poses))
+    return table | {"x": np.concatenate(columns["x"]), "y": zeros, "z": zeros}

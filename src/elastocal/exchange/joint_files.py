@@ -1,0 +1,79 @@
+"""Joint angles that lie in a file of their own: a table, or what MoveIt saves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from elastocal.campaigns.tables import read_text_table
+from elastocal.errors import InputError
+from elastocal.exchange.column_names import (
+    find_columns,
+    find_joints,
+    find_scales,
+    find_units,
+    read_units,
+    recognize_column,
+)
+from elastocal.io.documents import read_document
+from elastocal.mechanics.robot import Robot
+
+_YAML = (".yaml", ".yml")
+_HEADER = "a header with q1, q2 and so on, or the names of the robot's joints"
+
+
+def read_joint_angles(
+    path: str | Path, robot: Robot, unit: str | None = None
+) -> np.ndarray:
+    """Read the joint angles of all samples, (N, n), rad.
+
+    Parameters
+    ----------
+    path : table, or MoveIt's file of joint states (.yaml).
+    robot : robot whose joints columns may be named after.
+    unit : "deg" or "rad", of columns that state none.
+
+    Raises
+    ------
+    InputError
+        If a joint is missing or its unit is not stated.
+    """
+    if Path(path).suffix.lower() in _YAML:
+        return _read_joint_states(read_document(path), path, robot)
+
+    def is_header(cells: Sequence[str]) -> bool:
+        names = {recognize_column(cell)[0] for cell in cells} - {None}
+        named = {*cells} >= {*(robot.joint_names or ("",))}
+        return named or bool(find_joints(name for name in names if name))
+
+    text = read_text_table(path, is_header, wanted=_HEADER, units_in=read_units)
+    columns, stated_units = find_columns(text, {}, robot)
+    wanted = [f"q{joint}" for joint in range(1, robot.joints + 1)]
+    missing = [name for name in wanted if name not in columns]
+    if missing:
+        raise InputError(path, "header", f"no column {missing[0]!r}", _HEADER)
+    options = {"angles": unit} if unit else {}
+    units = find_units(text, columns, wanted, stated_units, options, robot)
+    return text.cells(columns, find_scales(units)).matrix(wanted)
+
+
+def _read_joint_states(document: Any, path: str | Path, robot: Robot) -> np.ndarray:
+    """Read the joint states that MoveIt's hand-eye calibration saves; they are in rad
+    and have the names of the joints."""
+    allowed = f"joint_names, and joint_values with {robot.joints} numbers in rad each"
+    try:
+        values = np.asarray(document["joint_values"], float)
+        names = [*document["joint_names"]]
+    except (KeyError, TypeError, ValueError):
+        raise InputError(path, "", "no joint states of MoveIt", allowed) from None
+    if values.ndim != 2 or values.shape[1] != len(names):
+        raise InputError(path, "joint_values", f"an array {values.shape}", allowed)
+    order = [*(robot.joint_names or ())]
+    if set(order) <= set(names) and order:
+        return values[:, [names.index(name) for name in order]]
+    if len(names) != robot.joints:
+        raise InputError(path, "joint_names", f"{len(names)} joints", allowed)
+    return values
