@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from analysed_robots import ROBOTS
 from made_blind_documents import PLAN
+from scipy.stats import binom
 
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.reading import read_campaign
@@ -27,6 +28,7 @@ SETTINGS = PLAN["settings"]
 # Digest of the names and seeds of the quick cases of seed 1, whose effects include
 # declared masses.
 NAMES_DIGEST = "2337bc6da1e6"
+LATER_SETTINGS = ("many_poses", "reflectors_off", "masses_without_compliances")
 
 
 def make_case(
@@ -67,56 +69,57 @@ def draw_sized_defects(case):
 
 
 @pytest.fixture(scope="module")
-def full_size():
-    return list_cases(PLAN, "full", 1)
+def registered():
+    return list_cases(PLAN, "registered", 1)
 
 
-def test_the_full_size_has_the_robots_null_cases_and_settings_of_the_protocol(
-    full_size,
+def test_the_registered_size_has_the_robots_null_cases_and_settings_of_the_protocol(
+    registered,
 ):
-    assert {case.robots for case in full_size} == {PROOF}
-    assert {case.robot for case in full_size} == {"gen3", "irb7600"}
-    assert len(full_size) <= 2000
-    assert sum(case.group == "none" for case in full_size) == 520
+    assert {case.robots for case in registered} == {PROOF}
+    robots = {case.robot for case in registered}
+    assert robots == {"sia20d", "sawyer", "irb4600", "m900ia260l"}
+    assert len(registered) <= 2000
+    assert sum(case.group == "none" for case in registered) == 320
     for setting, changes in SETTINGS.items():
         if changes.get("hard"):
             null_cases = [
                 case
-                for case in full_size
+                for case in registered
                 if case.setting == setting and not case.effects
             ]
-            assert len(null_cases) == 50
-    assert {case.setting for case in full_size} == set(SETTINGS)
-    assert len({case.name for case in full_size}) == len(full_size)
+            assert len(null_cases) == 24
+    assert {case.setting for case in registered} == set(SETTINGS)
+    assert len({case.name for case in registered}) == len(registered)
 
 
-def test_the_full_size_has_the_effects_and_levels_of_the_protocol(full_size):
+def test_the_registered_size_has_the_effects_and_levels_of_the_protocol(registered):
     def count(group, **fields):
         expected = {"group": group, **fields}.items()
-        return sum(expected <= vars(case).items() for case in full_size)
+        return sum(expected <= vars(case).items() for case in registered)
 
     for effect in CATALOGUE_EFFECTS:
-        # One of the two robots has no gravity compensator, so no wrong one either.
-        expected = 2 if effect.startswith("compensator") else 4
+        # One of the four robots has a gravity compensator, which can be wrong.
+        expected = 2 if effect.startswith("compensator") else 8
         for level in (25.0, 50.0, 200.0):
             assert count("single", effects=(effect,), levels=(level,)) == expected
     for effect in OUTSIDE_EFFECTS:
-        assert count("outside", effects=(effect,), levels=(200.0,)) == 10
+        assert count("outside", effects=(effect,), levels=(200.0,)) == 12
     for level in (50.0, 200.0):
-        assert count("pair", levels=(level, level)) == 60
+        assert count("pair", levels=(level, level)) == 48
     assert count("several_joints") == 52
     assert count("gear_gravity") == 64
-    assert count("remains") == 40
+    assert count("remains") == 32
 
 
-def test_only_the_full_size_contains_robots_of_the_proof():
+def test_only_the_registered_contains_robots_of_the_proof():
     for size in ("smoke", "quick", "development"):
         assert {case.robots for case in list_cases(PLAN, size, 1)} == {"tuned"}
 
 
-def test_cases_to_develop_on_are_in_no_other_size(full_size):
+def test_cases_to_develop_on_are_in_no_other_size(registered):
     developed = {case.seed for case in list_cases(PLAN, "development", 1)}
-    evaluated = [*list_cases(PLAN, "quick", 1), *full_size]
+    evaluated = [*list_cases(PLAN, "quick", 1), *registered]
     assert not developed & {case.seed for case in evaluated}
 
 
@@ -128,7 +131,7 @@ def test_names_and_seeds_follow_from_the_seed_and_the_key_alone():
     earlier_cases = [
         case
         for case in cases
-        if case.setting != "many_poses" and "two_angles" not in case.key
+        if case.setting not in LATER_SETTINGS and "two_angles" not in case.key
     ]
     names_and_seeds = " ".join(f"{case.name} {case.seed}" for case in earlier_cases)
     digest = hashlib.sha256(names_and_seeds.encode()).hexdigest()
@@ -250,3 +253,38 @@ def test_a_tilted_base_moves_points_more_that_are_farther_from_it(tmp_path):
         tilted.measurements.position - clean.measurements.position, axis=1
     )
     assert displacement_m.min() < displacement_m.max() < 2e-3
+
+
+def test_reflectors_sit_0_3_mm_from_their_declared_places(tmp_path):
+    clean, _ = write_and_read(make_case(), tmp_path / "clean")
+    moved, truth = write_and_read(make_case(setting="reflectors_off"), tmp_path / "off")
+    distances = np.linalg.norm(truth["reflectors_m"], axis=1)
+    np.testing.assert_allclose(distances, 3e-4)
+    displacement_m = np.linalg.norm(
+        moved.measurements.position - clean.measurements.position, axis=1
+    )
+    np.testing.assert_allclose(displacement_m, 3e-4, rtol=1e-6)
+    # Nobody says how exactly the places are known.
+    assert {target.offset_std_m for target in moved.targets} == {2e-4}
+    assert {target.offset_std_m for target in clean.targets} == {0.0}
+
+
+def test_a_campaign_without_loads_has_masses_and_no_compliances(tmp_path):
+    case = make_case(setting="masses_without_compliances")
+    campaign, _ = write_and_read(case, tmp_path)
+    assert not campaign.measurements.wrench.any()
+    assert campaign.robot.masses
+    robot_file = tmp_path / "blind" / case.name / "robot.yaml"
+    assert "compliance_urad_per_Nm" not in robot_file.read_text()
+
+
+def test_the_first_blocks_are_a_random_sample_of_all_groups(registered):
+    blocks = PLAN["sizes"]["registered"]["blocks"]
+    sample = [
+        case for block in range(blocks // 2) for case in registered[block::blocks]
+    ]
+    for group in {case.group for case in registered}:
+        share = np.mean([case.group == group for case in registered])
+        hits = sum(case.group == group for case in sample)
+        low, high = binom.interval(0.9999, len(sample), share)
+        assert low <= hits <= high

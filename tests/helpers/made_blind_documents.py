@@ -18,7 +18,7 @@ def make_truth(
     *located_effects,
     group=None,
     level=50.0,
-    robot="irb7600",
+    robot="m900ia260l",
     setting="usual",
     **changes,
 ):

@@ -1,4 +1,4 @@
-"""The blind proof as a workflow: no truth is read before the diagnosis, scores do not
+"""The blind benchmark as a workflow: no truth is read before the diagnosis, scores do not
 rerun it, a changed truth is refused."""
 
 import pytest
@@ -65,8 +65,8 @@ def test_edit_reruns_scores_and_no_diagnosis_of(edit, copy):
     if edit == "a target":
         copy.replace(
             path,
-            "upper limit below 4 %, high: 0.04",
-            "upper limit below 5 %, high: 0.05",
+            "at most 4 %, high: 0.04, acceptable",
+            "at most 5 %, high: 0.05, acceptable",
         )
     else:
         copy.edit(path)

@@ -1,6 +1,6 @@
 """The blind benchmark: sealed cases on an independent simulated robot, diagnosed without their ground truths and scored with them.
 
-`snakemake -j2 blind` runs the size quick, `--config blind=full` the full size; config/blind.yaml has the cases, sizes and targets.
+`snakemake -j2 blind` runs the size quick, `make proof` the registered size; config/blind.yaml has the cases, sizes and targets.
 Writes data/blind/, data/sealed/, results/blind/ and reports/blind/. Only seal_cases and, after the diagnosis, oracle_cases and
 score_cases read the sealed ground truths. diagnose_cases, the analyst, runs in separate processes that receive only the campaigns.
 """
@@ -12,10 +12,12 @@ if config["blind"] not in PLAN["sizes"]:
     sys.exit(f"config.yaml: blind: found {config['blind']!r}; allowed: {', '.join(PLAN['sizes'])}")
 BLIND_SIZE = PLAN["sizes"][config["blind"]]
 # Everything that determines the cases. Other targets and other sizes are left out, so that changing them makes no case again.
-CASES = {key: PLAN[key] for key in ("tuned", "absent", "settings", "limit")} | {
+CASES = {key: PLAN[key] for key in ("tuned", "absent", "settings")} | {
     "sizes": {config["blind"]: BLIND_SIZE}
 }
-BLIND = [f"{config['blind']}_{number + 1}" for number in range(BLIND_SIZE["blocks"])]
+# Each block is a random sample of all cases, so the first blocks alone are a smaller benchmark.
+BLIND_BLOCKS = min(config.get("blind_blocks", BLIND_SIZE["blocks"]), BLIND_SIZE["blocks"])
+BLIND = [f"{config['blind']}_{number + 1}" for number in range(BLIND_BLOCKS)]
 BLIND_ROBOTS = list(
     dict.fromkeys(robot for part in BLIND_SIZE["parts"] for robot in part["robots"])
 )
@@ -86,20 +88,21 @@ rule score_cases:
         verdicts=expand(rules.diagnose_cases.output.verdicts, block=BLIND),
         oracles=expand(rules.oracle_cases.output.oracle, block=BLIND),
     output:
-        cases="reports/blind/cases.csv",
-        intervals="reports/blind/intervals.csv",
-        locations="reports/blind/locations.csv",
+        cases="reports/blind/cases.parquet",
+        intervals="reports/blind/intervals.parquet",
+        locations="reports/blind/locations.parquet",
+        mechanisms="reports/blind/mechanisms.csv",
         summary=shown(
             "reports/blind/summary.csv",
             "blind_targets",
-            "Blind proof",
+            "Blind benchmark",
             shows="Every figure beside its target",
             kind="table",
         ),
         rates=shown(
             "reports/blind/rates.csv",
             "blind_power",
-            "Blind proof",
+            "Blind benchmark",
             shows="Rates by group, truth and size",
             kind="table",
         ),
@@ -121,21 +124,21 @@ rule draw_blind:
         targets=shown(
             "reports/blind/figures/targets.png",
             "blind_targets",
-            "Blind proof",
+            "Blind benchmark",
             shows="Figures against targets",
             kind="figure",
         ),
         reliability=shown(
             "reports/blind/figures/reliability.png",
             "blind_reliability",
-            "Blind proof",
+            "Blind benchmark",
             shows="Probabilities against frequencies",
             kind="figure",
         ),
         power=shown(
             "reports/blind/figures/power.png",
             "blind_power",
-            "Blind proof",
+            "Blind benchmark",
             shows="What is detected by size",
             kind="figure",
         ),
@@ -153,6 +156,7 @@ rule write_blind_page:
         summary=rules.score_cases.output.summary,
         cases=rules.score_cases.output.cases,
         locations=rules.score_cases.output.locations,
+        mechanisms=rules.score_cases.output.mechanisms,
         robots=rules.make_cases.input.robots,
     output:
         page="reports/blind/targets.md",

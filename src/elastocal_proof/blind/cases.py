@@ -36,6 +36,7 @@ from elastocal_proof.plant.kinds import (
     apply_defects,
     draw_defect,
 )
+from elastocal_proof.plant.laws import draw_direction
 from elastocal_proof.plant.multibody import compute_typical_gravity_torque
 from elastocal_proof.plant.simulated_robot import (
     Motion,
@@ -209,10 +210,22 @@ class BlindCase:
         )
         return replace(
             robot,
-            tracker=self.tracker,
+            tracker=self._place_reflectors(arm),
             pose_rad=(self.changes.get("pose_rad", 0.0),) * arm.joints,
             repeatability_rad=tuple(self.changes.get("joint_rad", 0.0) * factors),
         )
+
+    def _place_reflectors(self, arm: Arm) -> Tracker:
+        """Return the tracker of the setting, with each target as far from its declared
+        place as the setting says, in a random direction."""
+        distance_m = self.changes.get("reflector_off_m")
+        if not distance_m:
+            return self.tracker
+        draws = open_simulation_stream(self.seed, "reflectors")
+        displacements_m = [
+            tuple((distance_m * draw_direction(draws)).tolist()) for _ in arm.points
+        ]
+        return replace(self.tracker, reflectors_m=tuple(displacements_m))
 
     def robot_file(self, robots_folder: str | Path) -> Path:
         """Path of the robot file of which the robot is a specimen."""
@@ -331,7 +344,9 @@ def _list_entries(
             yield _Entry("setting", (effect,), (_HIGH,), setting, number)
         if setting == "usual" or hidden_effects:
             continue
-        for number in repetitions:
+        # Without loads, many effects leave no trace in the measurements.
+        with_effect = () if changes.get("without_effect") else repetitions
+        for number in with_effect:
             effect = _draw_pair(plan, seed, robot, setting, number)[0]
             yield _Entry("setting", (effect,), (_SETTING_LEVEL,), setting, number)
         hard_cases = part.get("hard", 0) if changes.get("hard") else 0
@@ -617,6 +632,8 @@ def write_sealed_case(
         "case": asdict(case),
         "defects": [_describe_defect(robot, sized) for sized in sized_defects],
     }
+    if robot.tracker.reflectors_m:
+        truth["reflectors_m"] = list(map(list, robot.tracker.reflectors_m))
     misplaced = robot.tracker.misplaced
     if misplaced:
         truth["misplaced"] = {

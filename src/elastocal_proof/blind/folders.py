@@ -48,8 +48,11 @@ class Experiment:
 
 def build_campaign_document(name: str, arm: Arm, design: Design) -> dict[str, Any]:
     """Build the contents of campaign.yaml, which do not depend on the defects."""
+    uncertainty = {}
+    if design.offset_std_m is not None:
+        uncertainty["offset_std_m"] = design.offset_std_m
     targets = {
-        f"{point}": {"point": point, "offset_m": [0, 0, 0], "offset_std_m": 0}
+        f"{point}": {"point": point, "offset_m": [0, 0, 0], **uncertainty}
         for point in design.points or arm.points
     }
     document = {

@@ -6,7 +6,7 @@ The figures of the plan are counted from these rows; see `summary`.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -44,38 +44,83 @@ EXACT_ALIASES: dict[tuple[str, tuple[int, ...]], str] = {
     ("transmission_harmonic", (2,)): "compensator_torque",
     ("link_weight", (2,)): "compensator_torque",
 }
-# Results of an oracle and of a best analyst that a case has none of.
+# Results of a case without an oracle.
 _NO_ORACLE: Document = {"detected": np.nan, "heldout": {"rms_m": np.nan}}
-_NO_LIMIT: Document = {"detected": np.nan, "right": np.nan}
 # Errors got worse if their increase is beyond this many standard errors.
 _STD_ERRORS = 2.0
 # Probability of a credible set.
 _CREDIBLE = 0.95
 
 
-def compute_rate(hits: Iterable[bool]) -> dict[str, float]:
+def compute_rate(
+    hits: Iterable[bool], clusters: Iterable[Any] | None = None
+) -> dict[str, float]:
     """Compute a share with its Clopper-Pearson interval [1]_ of 95 %.
 
-    Without cases the share is not a number and the interval is [0, 1].
+    Outcomes of one cluster, such as the parameters of one campaign or the cases of one
+    effect, resemble each other. With clusters the interval is therefore that of the
+    effective number of cases [2]_. Without cases the share is not a number and the
+    interval is [0, 1].
+
+    Parameters
+    ----------
+    hits : iterable of bool
+        Outcomes.
+    clusters : iterable, optional
+        Cluster of each outcome; without them all outcomes are independent.
 
     References
     ----------
     .. [1] Clopper, C. J. and Pearson, E. S., The use of confidence or fiducial limits
        illustrated in the case of the binomial, Biometrika 26, 1934.
+    .. [2] Korn, E. L. and Graubard, B. I., Confidence intervals for proportions with
+       small expected number of positive counts estimated from survey data, Survey
+       Methodology 24, 1998.
     """
-    hits = [bool(hit) for hit in hits]
-    count = sum(hits)
-    cases = len(hits)
+    outcomes = np.array([bool(hit) for hit in hits])
+    cases = len(outcomes)
     if not cases:
         return {"hits": 0, "cases": 0, "rate": np.nan, "low": 0.0, "high": 1.0}
-    low, high = proportion_confint(count, cases, 0.05, "beta")
+    count = int(outcomes.sum())
+    effective_cases = float(cases)
+    if clusters is not None:
+        effective_cases = _count_effective_cases(outcomes, list(clusters))
+    rate = count / cases
+    low, high = proportion_confint(
+        rate * effective_cases, effective_cases, 0.05, "beta"
+    )
     return {
         "hits": count,
         "cases": cases,
-        "rate": count / cases,
+        "rate": rate,
         "low": 0.0 if count == 0 else float(low),
         "high": 1.0 if count == cases else float(high),
     }
+
+
+def _count_effective_cases(outcomes: np.ndarray, clusters: Sequence[Any]) -> float:
+    """Number of independent outcomes whose share is as uncertain as that of outcomes in
+    clusters, at most the number of outcomes.
+
+    The variance is that between the sums of the clusters. If all outcomes are equal, it
+    cannot be estimated, and each cluster counts once.
+    """
+    cases = len(outcomes)
+    rate = outcomes.mean()
+    indices = np.unique(np.array(clusters, str), return_inverse=True)[1]
+    deviations = np.bincount(indices, outcomes - rate)
+    count = len(deviations)
+    if count == 1 or rate in (0.0, 1.0):
+        return float(count)
+    variance = count / (count - 1) * (deviations @ deviations) / cases**2
+    if variance == 0.0:
+        return float(cases)
+    # The variance is estimated from few clusters, which widens the interval.
+    of_cases, of_clusters = map(
+        float, t_distribution.ppf(0.975, [cases - 1, count - 1])
+    )
+    correction = (of_cases / of_clusters) ** 2
+    return float(min(cases, correction * rate * (1.0 - rate) / variance))
 
 
 def build_case_row(
@@ -83,7 +128,6 @@ def build_case_row(
     truth: Document,
     verdict: Document,
     oracle: Document | None = None,
-    limit: Document | None = None,
 ) -> dict[str, Any]:
     """Build one row of cases.csv.
 
@@ -93,22 +137,23 @@ def build_case_row(
         Contents of config/blind.yaml.
     truth, verdict : mapping
         Sealed document of a case, and its verdict as in verdict.json.
-    oracle, limit : mapping, optional
-        Results of `oracle.fit_oracle` and `oracle.assess_best_analyst`.
+    oracle : mapping, optional
+        Result of `oracle.fit_oracle`.
 
     Returns
     -------
     dict
         Besides facts of the case and of its verdict: ``exact``, the names of the
         verdict are the true ones; ``named_right``, so and the verdict states no other
-        name; ``holds_truth``, the verdict has as many effects as the truth, and each
+        name; ``located``, so and every effect that acts at joints has the true joints;
+        ``holds_truth``, the verdict has as many effects as the truth, and each
         true one is the name or an alternative of a different effect of the verdict;
-        ``wrong_name``, a single wrong name is stated; ``remains``, a repeatable
+        ``wrong_name``, a single wrong name is stated; ``false_mechanism``, the verdict
+        has an effect for which it names no true mechanism; ``remains``, a repeatable
         residual is reported; ``exact_alias``, the effect lies within the span of
         another effect that the robot can have, by the ground truth alone.
     """
     oracle = oracle or _NO_ORACLE
-    limit = limit or _NO_LIMIT
     case = truth["case"]
     defects = truth["defects"]
     kind, effects = _remove_setup_effects(truth, verdict)
@@ -128,6 +173,7 @@ def build_case_row(
         "robot": case["robot"],
         "robots": case["robots"],
         "setting": case["setting"],
+        "hard": bool(plan["settings"][case["setting"]].get("hard")),
         "truth": _join(true_names),
         "level": max(case["levels"], default=0.0),
         "verdict": kind,
@@ -135,8 +181,11 @@ def build_case_row(
         "detected": kind not in (ADEQUATE, NOT_TESTABLE),
         "exact": exact,
         "named_right": exact and kind == NAMED,
+        "located": exact and kind == NAMED and _has_true_joints(truth, effects),
         "holds_truth": claims and _can_match(true_names, effects),
         "wrong_name": kind == NAMED and names != true_names,
+        "false_mechanism": kind in (NAMED, CLASS, SEVERAL)
+        and any(_list_names(effect).isdisjoint(true_names) for effect in effects),
         "remains": bool(repeatable and repeatable["remains"]),
         "joints": " + ".join(joints),
         "exact_alias": bool(
@@ -146,14 +195,30 @@ def build_case_row(
         **_describe_errors(verdict),
         "oracle_detected": float(oracle["detected"]),
         "oracle_rms_m": oracle["heldout"]["rms_m"],
-        "limit_detected": float(limit["detected"]),
-        "limit_right": float(limit["right"]),
         **score_probabilities(truth, verdict, _find_hidden_effects(plan, case)),
     }
 
 
 def _join(names: Iterable[str]) -> str:
     return " + ".join(names) or NONE
+
+
+def _list_names(effect: Document) -> set[str]:
+    """Mechanisms that a verdict states for one effect: its name and alternatives."""
+    return {effect["name"], *map(effect_of, effect["alternatives"])}
+
+
+def _has_true_joints(truth: Document, effects: Iterable[Document]) -> bool:
+    """Check whether each effect of a verdict is at the true joints, if the mechanism
+    acts at joints."""
+    true_joints: dict[str, set[int]] = {}
+    for defect in truth["defects"]:
+        true_joints.setdefault(defect["effect"], set()).update(defect["joints"])
+    return all(
+        set(effect["joints"]) == true_joints[effect["name"]]
+        for effect in effects
+        if true_joints[effect["name"]]
+    )
 
 
 def _can_match(true_names: list[str], effects: list[Document]) -> bool:
@@ -169,7 +234,7 @@ def _can_match(true_names: list[str], effects: list[Document]) -> bool:
         return False
     cost = np.ones((len(effects), len(true_names)))
     for effect, row in zip(effects, cost, strict=True):
-        possible = {effect["name"], *map(effect_of, effect["alternatives"])}
+        possible = _list_names(effect)
         row[[name in possible for name in true_names]] = 0.0
     return not cost[linear_sum_assignment(cost)].any()
 
@@ -342,6 +407,7 @@ def list_intervals(truth: Document, verdict: Document) -> list[dict[str, Any]]:
         if effect["name"] == defect["effect"]:
             estimates += _list_comparable_parameters(defect, effect)
     facts = {
+        "case": truth["campaign"],
         "truth": _join(case["effects"]),
         "foreign": any(effect.startswith(OUTSIDE) for effect in case["effects"]),
         "level": max(case["levels"], default=0.0),

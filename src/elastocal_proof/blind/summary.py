@@ -10,13 +10,20 @@ import numpy as np
 import pandas as pd
 from scipy.stats import bootstrap
 
+from elastocal.diagnosis.verdict import NAMED
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json
 from elastocal.random_streams import open_stream
 from elastocal_proof.blind.cases import PROOF, TUNED, Plan
 from elastocal_proof.blind.folders import load_ground_truth
 from elastocal_proof.blind.locations import list_locations, tabulate_locations
-from elastocal_proof.blind.scores import build_case_row, compute_rate, list_intervals
+from elastocal_proof.blind.power import compute_power
+from elastocal_proof.blind.scores import (
+    NONE,
+    build_case_row,
+    compute_rate,
+    list_intervals,
+)
 
 Tables = Mapping[str, pd.DataFrame]
 # An entry of the plan's ``figures``, and its target: words and limits.
@@ -30,10 +37,17 @@ _BATCH = 200
 NEAR_ORACLE = 1.05
 # Bins of the reliability diagram and of the calibration error.
 _BINS = 10
-BY_THE_BEST = ", by the best analyst"
-OVER_THE_BEST = ", over the best analyst's, on the same cases"
+_LIMITS = ("target_low", "target_high", "power", "risk")
 _RELIABILITY = ["group", "from", "to", "stated", "hits", "cases", "rate", "low", "high"]
-_COUNTED = ["detected", "holds_truth", "named_right", "wrong_name", "oracle_detected"]
+_COUNTED = [
+    "detected",
+    "holds_truth",
+    "named_right",
+    "located",
+    "wrong_name",
+    "false_mechanism",
+    "oracle_detected",
+]
 
 
 def select_targets(summary: pd.DataFrame) -> pd.DataFrame:
@@ -55,8 +69,8 @@ def summarize_figures(
 ) -> pd.DataFrame:
     """Compute every figure of the plan and compare it with its target.
 
-    Rates have Clopper-Pearson intervals, ratios percentile bootstrap intervals [1]_
-    over cases.
+    Rates have Clopper-Pearson intervals, of the effective number of cases if the figure
+    names ``clusters``; ratios have percentile bootstrap intervals [1]_ over cases.
 
     Parameters
     ----------
@@ -73,7 +87,9 @@ def summarize_figures(
     -------
     DataFrame
         One row for each figure. ``target_low`` and ``target_high`` are the range of the
-        target; ``holds`` is empty without a target or a case.
+        target; ``holds`` is empty without a target or a case. ``power`` and ``risk``
+        are the probabilities to reach the target at its acceptable and at its
+        unacceptable rate, with the number of cases that there are.
 
     References
     ----------
@@ -125,13 +141,14 @@ def _list_figure_rows(
                 words = figure["words"].format(setting=describe_setting(plan, setting))
                 yield from _measure(figure, rows, words, target, seed)
     elif "by" in figure:
+        shared = {key: figure[key] for key in ("clusters",) if key in figure}
         for level, rows in selected.groupby(figure["by"]):
             for entry in figure["parts"]:
                 words = entry["words"].format(at=f"at {level:g}")
                 target = None
                 if level in entry.get("levels", [level]):
                     target = entry.get("target")
-                yield from _measure(entry, rows, words, target, seed)
+                yield from _measure(shared | entry, rows, words, target, seed)
     elif len(selected) or not figure.get("if_any"):
         yield from _measure(figure, selected, figure["words"], target, seed)
 
@@ -149,18 +166,22 @@ def _measure(
     measure = figure.get("measure")
     if measure is None:
         concerned = rows.query(figure["among"]) if "among" in figure else rows
-        share = compute_rate(concerned[str(figure["hits"])])
+        clusters = concerned[figure["clusters"]] if "clusters" in figure else None
+        share = compute_rate(concerned[str(figure["hits"])], clusters)
         yield _describe_figure(words, share, target)
-    elif measure == "over_limit":
-        sampled = rows[rows.limit_right.notna()]
-        best = sampled[str(figure["best"])].to_numpy(float)
-        hits = sampled[figure["hits"]].to_numpy(float)
-        yield _describe_figure(f"{words}{BY_THE_BEST}", compute_rate(best == 1.0), None)
-        draws = open_stream(seed, "blind", f"{words} over the limit", 0)
-        ratio = _bootstrap((hits, best), _divide_sums, draws)
-        yield _describe_figure(f"{words}{OVER_THE_BEST}", ratio, target)
     elif measure == "calibration_error":
         yield _describe_figure(words, estimate_calibration(rows, seed), target)
+    elif measure == "chance_calibration_error":
+        yield _describe_figure(words, simulate_calibrated(rows, seed), target)
+    elif measure == "removed":
+        squares = [
+            rows[name].to_numpy(float) ** 2
+            for name in ("before_rms_m", "after_rms_m", "oracle_rms_m")
+        ]
+        before, after, best = squares
+        draws = open_stream(seed, "blind", words, 0)
+        share = _bootstrap((before - after, before - best), _divide_sums, draws)
+        yield _describe_figure(words, share, target)
     elif measure in ("median_ratio", "mean_ratio"):
         ratios = (rows.after_rms_m / rows.oracle_rms_m).to_numpy()
         statistic = np.median if measure == "median_ratio" else np.mean
@@ -175,23 +196,31 @@ def _describe_figure(
 ) -> dict[str, Any]:
     """Describe an estimate with its interval, and whether the target is met."""
     if not target:
-        limits = {"target": "", "target_low": np.nan, "target_high": np.nan}
+        limits = dict.fromkeys(_LIMITS, np.nan) | {"target": ""}
         return {"quantity": quantity, **estimate, **limits, "holds": None}
     low = target.get("low", 0.0)
     high = target.get("high", 1.0)
     holds = None
     if estimate["cases"]:
-        too_uncertain = estimate["high"] >= target.get("below", np.inf)
-        holds = bool(low <= estimate["rate"] <= high and not too_uncertain)
-    limits = {"target": target["words"], "target_low": low, "target_high": high}
+        holds = bool(low <= estimate["rate"] <= high)
+    cases = int(estimate["cases"])
+    limits = {
+        "target": target["words"],
+        "target_low": low,
+        "target_high": high,
+        "power": compute_power(target, cases, "acceptable"),
+        "risk": compute_power(target, cases, "unacceptable"),
+    }
     return {"quantity": quantity, **estimate, **limits, "holds": holds}
 
 
-def _divide_sums(hits: np.ndarray, best_hits: np.ndarray, axis: int = -1) -> np.ndarray:
-    """Divide the number of hits by the best analyst's; if there are none of these,
-    there is nothing to reach."""
-    best_count = best_hits.sum(axis=axis)
-    return hits.sum(axis=axis) / np.where(best_count > 0, best_count, np.nan)
+def _divide_sums(
+    removed: np.ndarray, removable: np.ndarray, axis: int = -1
+) -> np.ndarray:
+    """Divide the sum that is removed by the sum that the oracle removes; if the oracle
+    removes nothing, there is nothing to reach."""
+    total = removable.sum(axis=axis)
+    return removed.sum(axis=axis) / np.where(total > 0, total, np.nan)
 
 
 def _bootstrap(
@@ -228,6 +257,26 @@ def _describe_estimate(
         "low": float(low),
         "high": float(high),
     }
+
+
+def simulate_calibrated(rows: pd.DataFrame, seed: int) -> dict[str, Any]:
+    """Simulate the mean expected calibration error of calibrated verdicts that state the
+    same probabilities, by consistency resampling [1]_.
+
+    References
+    ----------
+    .. [1] Bröcker, J. and Smith, L. A., Increasing the reliability of reliability
+       diagrams, Weather and Forecasting 22, 2007.
+    """
+    cases = len(rows)
+    probability = rows.stated.to_numpy(float)
+    draws = open_stream(seed, "blind", "calibration error by chance", 0)
+    outcomes = draws.random((_RESAMPLES, cases)) < probability
+    replicates = compute_calibration_error(
+        np.broadcast_to(probability, outcomes.shape), outcomes
+    )
+    mean = float(replicates.mean()) if cases else np.nan
+    return _describe_estimate(cases, mean, np.nan, np.nan)
 
 
 def compute_calibration_error(
@@ -341,6 +390,29 @@ def tabulate_rates(cases: pd.DataFrame) -> pd.DataFrame:
     return shares.rename(columns={"case": "cases"}).reset_index()
 
 
+def tabulate_mechanisms(cases: pd.DataFrame) -> pd.DataFrame:
+    """Count what a verdict states, by true mechanism and level: the confusion table of
+    mechanisms.
+
+    Parameters
+    ----------
+    cases : DataFrame
+        Rows of `scores.build_case_row`.
+
+    Returns
+    -------
+    DataFrame
+        One row for each true mechanism of the groups with one mechanism, its level, and
+        each ``stated``: the mechanisms of the verdict, or its kind if it states none.
+        ``alone``: without alternatives.
+    """
+    single = cases[cases.group.isin(("single", "outside"))]
+    stated = single.found.where(single.found != NONE, single.verdict)
+    table = single.assign(stated=stated, alone=single.verdict == NAMED)
+    keys = ["group", "truth", "level", "stated", "alone"]
+    return table.groupby(keys).size().rename("cases").reset_index()
+
+
 def score_cases(job: Any) -> None:
     """Score the verdicts against the sealed ground truths."""
     plan = job.params.plan
@@ -356,15 +428,16 @@ def score_cases(job: Any) -> None:
     location_rows = []
     for name, truth in truths.items():
         verdict = verdicts[name]
-        case_rows.append(build_case_row(plan, truth, verdict, **oracles[name]))
+        case_rows.append(build_case_row(plan, truth, verdict, oracles[name]))
         interval_rows += list_intervals(truth, verdict)
         location_rows += list_locations(truth, verdict)
     cases = pd.DataFrame(case_rows)
     intervals = pd.DataFrame(interval_rows)
     locations = tabulate_locations(location_rows)
-    write_csv(job.output.cases, cases)
-    write_csv(job.output.intervals, intervals)
-    write_csv(job.output.locations, locations)
+    cases.to_parquet(job.output.cases, index=False)
+    intervals.to_parquet(job.output.intervals, index=False)
+    locations.to_parquet(job.output.locations, index=False)
+    write_csv(job.output.mechanisms, tabulate_mechanisms(cases))
     write_csv(job.output.rates, tabulate_rates(cases))
     write_csv(job.output.reliability, tabulate_reliability(cases))
     summary = summarize_figures(plan, cases, intervals, job.params.seed, locations)

@@ -35,7 +35,10 @@ if TYPE_CHECKING:
 
 _COLOR = PALETTE[0]
 _TARGET_COLOR = "#cfe8d5"
-_ROBOTS = {PROOF: "robots of the proof", TUNED: "robots on which it was developed"}
+_ROBOTS = {
+    PROOF: "robots on which nothing was developed",
+    TUNED: "robots on which elastocal was developed",
+}
 _PER_CENT = 100.0
 # Number of letters after which a label of a row is wrapped.
 _LABEL_WIDTH = 40
@@ -80,12 +83,7 @@ def draw_targets(summary: pd.DataFrame) -> Figure:
     heights = [max(table.quantity.nunique(), 1) for table in (shares, ratios)]
     figure, axes = create_panels(2, 1, 32 + 7.4 * sum(heights), height_ratios=heights)
     _draw_intervals(axes[0, 0], shares, lambda share: _PER_CENT * share)
-    # A share of the best analyst's detections may exceed 100 %.
-    largest_share = _PER_CENT * np.nanmax(shares.high.to_numpy(float), initial=0.0)
-    axes[0, 0].set(
-        xlim=(-2, max(102.0, 1.05 * largest_share)),
-        xlabel="share of cases, or of what the best analyst finds (%)",
-    )
+    axes[0, 0].set(xlim=(-2, 102), xlabel="share of cases (%)")
     _draw_intervals(axes[1, 0], ratios, lambda ratio: _PER_CENT * (ratio - 1.0))
     excess = _PER_CENT * (ratios[["rate", "low", "high"]].to_numpy(float) - 1.0)
     limit = 1.1 * np.nanmax(np.abs(excess), initial=6.0)

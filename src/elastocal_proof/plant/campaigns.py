@@ -99,6 +99,9 @@ class Design:
         "base" or "tracker".
     undeclared
         Keys that the analyst's robot file lacks.
+    offset_std_m
+        Standard deviation of the declared places of the targets; None if the campaign
+        does not state it, as most do not.
     """
 
     poses: int = 30
@@ -115,6 +118,7 @@ class Design:
     measured: str = "pose"
     frame: str = "base"
     undeclared: tuple[str, ...] = ()
+    offset_std_m: float | None = 0.0
 
 
 def get_typical_force_N(arm: Arm) -> float:  # noqa: N802 - units in names keep their case

@@ -88,6 +88,9 @@ class Tracker:
         x is read at (1 + s) x.
     outliers, outlier_sigmas
         Share of the measurements whose noise is larger, and how many times it is.
+    reflectors_m
+        (targets, 3): displacements of the targets from their declared places, in the
+        axes of their measuring points; empty if all are where they are declared.
     nest
         Eccentricity (m, axis) of the flange's reflector nest. The target's centre
         circles twice per turn of the tool, e (cos 2 q_n, sin 2 q_n) across an axis of
@@ -106,6 +109,7 @@ class Tracker:
     scale: float = 0.0
     outliers: float = 0.0
     outlier_sigmas: float = 8.0
+    reflectors_m: tuple[tuple[float, ...], ...] = ()
     nest: tuple[float, int] | None = None
 
     def observe(
@@ -124,6 +128,9 @@ class Tracker:
         time_s, tool_angle : (S,) arrays
             Time and angle of the last joint, rad.
         """
+        if self.reflectors_m:
+            displacement = np.array(self.reflectors_m)
+            position = position + np.einsum("stij,tj->sti", rotation, displacement)
         if self.nest:
             radius, axis = self.nest
             circle = np.stack(

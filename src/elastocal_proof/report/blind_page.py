@@ -9,14 +9,15 @@ from typing import Any
 import pandas as pd
 
 from elastocal.counting import format_count, format_integer
+from elastocal.diagnosis.verdict import ADEQUATE, NOT_TESTABLE, UNEXPLAINED
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.documents import read_document
 from elastocal.report.words import format_number
 from elastocal_proof.blind.cases import PROOF, Plan
 from elastocal_proof.blind.locations import tabulate_confusion
+from elastocal_proof.blind.power import tabulate_registered_targets
+from elastocal_proof.blind.scores import NONE
 from elastocal_proof.blind.summary import (
-    BY_THE_BEST,
-    OVER_THE_BEST,
     iterate_rows,
     select_targets,
     summarize_by_robot,
@@ -25,13 +26,16 @@ from elastocal_proof.league.table import format_table
 
 _ABSENT = "–"
 _OUTCOMES = {"True": "reached", "False": "missed"}
+_PROBABILITIES = {"acceptable": "power", "unacceptable": "risk"}
+_SHARES = {1: "all cases", 0.5: "half of them"}
+# Statements of verdicts without a mechanism.
+_SILENT = (NONE, ADEQUATE, NOT_TESTABLE, UNEXPLAINED)
 
 
 def format_targets_page(
-    plan: Plan,
     summary: pd.DataFrame,
     summaries_by_robot: Mapping[str, pd.DataFrame],
-    locations: pd.DataFrame,
+    confusion: Mapping[str, pd.DataFrame],
     size: str,
     seed: int,
 ) -> str:
@@ -39,39 +43,112 @@ def format_targets_page(
 
     Parameters
     ----------
-    plan
-        Plan of the blind benchmark.
     summary
         Summary of all robots together.
     summaries_by_robot
         Tables of `summary.summarize_by_robot` by the names of the robots.
-    locations
-        Rows of `locations.list_locations`.
+    confusion
+        ``mechanisms``, of `summary.tabulate_mechanisms`, and ``locations``, rows of
+        `locations.list_locations`.
     size, seed
         Configuration of the run.
     """
-    rows = tabulate_targets(plan, summary, summaries_by_robot)
-    return f"""# Targets of the blind proof
+    rows = tabulate_targets(summary, summaries_by_robot)
+    return f"""# Targets of the blind benchmark
 
 Written by `snakemake -j2 blind_pictures --config blind={size} seed={seed}`; \
-[what it means](blind_proof.md). "At 50" is at a
-non-centrality of 50. Brackets hold 95 % intervals: of shares Clopper–Pearson, \
-of the others a bootstrap over cases.
+[what it means](blind_benchmark.md). "At 50" is at a
+non-centrality of 50. Brackets hold 95 % intervals: of shares Clopper–Pearson with \
+the effective number of cases (cases of one effect and intervals of one campaign are \
+clusters), of other quantities a bootstrap over cases. Power is the probability to reach \
+the target at its acceptable rate, risk that at its unacceptable rate.
 
 {describe_reached_targets(summary)}
 
 {format_table(rows)}
 
-## Where
+## Quantities without a target
+
+{format_table(tabulate_other_quantities(summary))}
+
+## Mechanisms
+
+True mechanism and what the verdict states, for one mechanism at its largest size. \
+"Other statements" lists the mechanisms that are stated in place of the true one.
+
+{_format_mechanisms(confusion["mechanisms"])}
+
+## Joints
 
 Effects that act at one joint, or link, by its number and by the number that the \
 verdict states beside the right name.
 
-{_format_confusion(locations)}
+{_format_locations(confusion["locations"])}
 """
 
 
-def _format_confusion(locations: pd.DataFrame) -> str:
+def format_registration(plan: Plan, size: str, seed: int) -> str:
+    """Format the table of the targets of a benchmark that is not made yet, with the
+    power and the risk of all cases and of half of them."""
+    table = tabulate_registered_targets(plan, size, seed)
+    rows = []
+    for row in table.to_dict("records"):
+        cells = {"quantity": row["quantity"], "target": row["target"]}
+        cells["cases"] = _ABSENT if pd.isna(row["cases"]) else f"{int(row['cases'])}"
+        for name, probability in _PROBABILITIES.items():
+            cells[f"{name} rate"] = _format_percentage(row[name], 1)
+            for share, words in _SHARES.items():
+                value = _format_percentage(row[f"{name}_at_{share:g}"], 0)
+                cells[f"{probability}, {words}"] = value
+        rows.append(cells)
+    return format_table(rows)
+
+
+def _format_percentage(share: float, digits: int) -> str:
+    return _ABSENT if pd.isna(share) else f"{100 * share:.{digits}f} %"
+
+
+def tabulate_other_quantities(summary: pd.DataFrame) -> list[dict[str, str]]:
+    """Tabulate the quantities that have no target."""
+    targets = select_targets(summary).quantity
+    others = summary[~summary.quantity.isin(targets)]
+    return [
+        {
+            "quantity": row.quantity,
+            "robots together": _format_interval(row),
+            "cases": _format_hits(row),
+        }
+        for row in iterate_rows(others)
+    ]
+
+
+def _format_mechanisms(mechanisms: pd.DataFrame) -> str:
+    """Format the confusion table of mechanisms, a row for each true one."""
+    rows = []
+    for truth, stated in mechanisms.groupby("truth"):
+        largest = stated[stated.level == stated.level.max()]
+        is_right = largest.stated == truth
+        is_silent = largest.stated.isin(_SILENT)
+        wrong = largest[~is_right & ~is_silent].groupby("stated").cases.sum()
+        statements = wrong.sort_values(ascending=False, kind="stable").items()
+        rows.append(
+            {
+                "true mechanism": str(truth).replace("_", " "),
+                "cases": str(largest.cases.sum()),
+                "right, alone": str(largest[is_right & largest.alone].cases.sum()),
+                "right, with alternatives": str(
+                    largest[is_right & ~largest.alone].cases.sum()
+                ),
+                "nothing stated": str(largest[is_silent].cases.sum()),
+                "other statements": ", ".join(
+                    f"{name.replace('_', ' ')} {count}" for name, count in statements
+                ),
+            }
+        )
+    return format_table(rows)
+
+
+def _format_locations(locations: pd.DataFrame) -> str:
     confusion = tabulate_confusion(locations)
     columns = list(map(str, confusion.columns))
     cells = confusion.itertuples(index=False)
@@ -84,53 +161,44 @@ def describe_reached_targets(summary: pd.DataFrame) -> str:
     reached = int((judged.holds.astype(str) == "True").sum())
     robots = "robots on which the method was developed, which proves nothing"
     if summary.robots.iloc[0] == PROOF:
-        robots = "the robots of the proof"
+        robots = "robots on which nothing was developed"
     figures = format_count(len(judged), "figure")
     return f"{reached} of {figures} with a target reach it on {robots}."
 
 
 def tabulate_targets(
-    plan: Plan, summary: pd.DataFrame, summaries_by_robot: Mapping[str, pd.DataFrame]
+    summary: pd.DataFrame, summaries_by_robot: Mapping[str, pd.DataFrame]
 ) -> list[dict[str, str]]:
-    """Tabulate each quantity with a target, for all robots together and for each one,
-    and for the best possible analyst.
+    """Tabulate each quantity with a target, for all robots together and for each one.
 
     Parameters are those of `format_targets_page`.
     """
-    overall = _index_by_quantity(summary)
     by_robot = {
         name: _index_by_quantity(table) for name, table in summaries_by_robot.items()
     }
-    # The analyst of the limit sees a sample. These quantities of the sample are shown with
-    # the same quantity of all cases.
-    quantity_of_all = {
-        figure["words"]: figure["beside"]
-        for figure in plan["figures"]
-        if "beside" in figure
-    }
     rows = []
     for target in iterate_rows(select_targets(summary)):
-        quantity = target.quantity.removesuffix(OVER_THE_BEST)
-        shown: Any = overall.get(quantity_of_all.get(quantity, ""), target)
-        limit = overall.get(f"{quantity}{BY_THE_BEST}")
         cells = {
-            "quantity": shown.quantity,
+            "quantity": target.quantity,
             "target": target.target,
             "outcome": _OUTCOMES.get(str(target.holds), "no case"),
-            "robots together": _format_interval(shown),
-            "cases": _format_hits(shown),
+            "robots together": _format_interval(target),
+            "cases": _format_hits(target),
+            "power, risk": _format_power(target),
         }
         for name, quantities in by_robot.items():
             cells[name] = _ABSENT
-            if shown.quantity in quantities:
-                cells[name] = _format_rate(quantities[shown.quantity])
-        if limit:
-            cells["limit, on a sample"] = (
-                f"{_format_interval(limit)}, {_format_hits(limit)}"
-            )
-            cells["found over limit, same sample"] = _format_interval(target)
+            if target.quantity in quantities:
+                cells[name] = _format_rate(quantities[target.quantity])
         rows.append(cells)
     return rows
+
+
+def _format_power(row: Any) -> str:
+    if pd.isna(row.power):
+        return _ABSENT
+    power = _format_percentage(row.power, 0)
+    return f"{power}, {_format_percentage(row.risk, 0)}"
 
 
 def _index_by_quantity(summary: pd.DataFrame) -> dict[str, Any]:
@@ -166,12 +234,13 @@ def write_blind_page(job: Any) -> None:
     """Write the page from reports/blind/."""
     params = job.params
     summary = pd.read_csv(job.input.summary)
-    cases = pd.read_csv(job.input.cases)
+    cases = pd.read_parquet(job.input.cases)
     names = {Path(file).stem: read_document(file)["name"] for file in job.input.robots}
     tables = summarize_by_robot(params.plan, cases, params.seed)
     by_robot = {names[robot]: table for robot, table in tables.items()}
-    locations = pd.read_csv(job.input.locations)
-    page = format_targets_page(
-        params.plan, summary, by_robot, locations, params.size, params.seed
-    )
+    confusion = {
+        "mechanisms": pd.read_csv(job.input.mechanisms),
+        "locations": pd.read_parquet(job.input.locations),
+    }
+    page = format_targets_page(summary, by_robot, confusion, params.size, params.seed)
     write_text(job.output.page, page)
