@@ -221,11 +221,12 @@ def test_words_that_are_listed_without_a_table_are_on_the_page(page):
 
 
 def test_every_page_is_checked():
-    """Pages of tables are left out, because commands write them."""
+    """Pages of tables are left out, because commands write them; tests/blind/test_power.py
+    computes the page of the registration."""
     pages = {
         f"docs/{page.name}"
         for page in (ROOT / "docs").glob("*.md")
-        if not page.name.endswith("_tables.md")
+        if not page.name.endswith("_tables.md") and page.name != "blind_registration.md"
     }
     assert set(SOURCES) == pages | {"README.md"}
     assert len(list_entries()) > 100
