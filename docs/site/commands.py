@@ -17,7 +17,7 @@ _EXAMPLE = re.compile(r"^\x08\n(Examples?):\n((?:  .+\n)+)", re.MULTILINE)
 HEAD = """# Commands
 
 Made from the code; `elastocal COMMAND --help` prints the same. [The commands, one by
-one](../docs/afternoon.md) explains them.
+one](../docs/command_reference.md) explains them.
 
 """
 
