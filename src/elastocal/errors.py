@@ -39,6 +39,7 @@ EXTRAS = {
     "mujoco": "proof",
     "statsmodels": "proof",
     "pinocchio": "audit",
+    "cv2": "camera",
 }
 _USABLE = (
     "a file or folder that is there, on a disk with space, where this user may read "

@@ -33,7 +33,7 @@ NAMED = replace(ROBOT, joint_names=NAMES)
 def test_a_table_is_read(tmp_path, robot, header, unit, scale):
     path = tmp_path / "joints.csv"
     np.savetxt(path, scale * ANGLES, delimiter=",", header=header, comments="")
-    np.testing.assert_allclose(read_joint_angles(path, robot, unit), ANGLES)
+    np.testing.assert_allclose(read_joint_angles(path, robot, unit).angles, ANGLES)
 
 
 def test_joint_states_of_moveit_are_put_into_the_order_of_the_robot(tmp_path):
@@ -43,9 +43,11 @@ def test_joint_states_of_moveit_are_put_into_the_order_of_the_robot(tmp_path):
         "joint_values": ANGLES[:, ::-1].tolist(),
     }
     path.write_text(yaml.safe_dump(document))
-    np.testing.assert_array_equal(read_joint_angles(path, NAMED), ANGLES)
+    np.testing.assert_array_equal(read_joint_angles(path, NAMED).angles, ANGLES)
     # Without names in the robot's file the order of the file counts.
-    np.testing.assert_array_equal(read_joint_angles(path, ROBOT), ANGLES[:, ::-1])
+    np.testing.assert_array_equal(
+        read_joint_angles(path, ROBOT).angles, ANGLES[:, ::-1]
+    )
 
 
 def test_missing_joints_and_units_are_refused(tmp_path):
@@ -81,3 +83,11 @@ def test_other_documents_are_refused(tmp_path, document, key, phrases):
     path.write_text(yaml.safe_dump(document))
     with refused(path, key, *phrases):
         read_joint_angles(path, ROBOT)
+
+
+def test_a_column_of_images_is_kept(tmp_path):
+    path = tmp_path / "joints.csv"
+    header = ",".join(f"q{joint}" for joint in range(1, 8))
+    rows = [f"{number}.png,{','.join(7 * ['0.1'])}" for number in range(2)]
+    path.write_text("\n".join([f"image,{header}", *rows]) + "\n")
+    assert read_joint_angles(path, ROBOT, "rad").images == ("0.png", "1.png")

@@ -73,10 +73,10 @@ def test_what_every_user_installs_is_imported_by_what_every_user_runs():
 
 
 def test_messages_name_the_extra_of_each_package():
-    modules = {"pin": "pinocchio"}
+    modules = {"pin": "pinocchio", "opencv-python-headless": "cv2"}
     packages = {
         modules.get(name, name): extra
-        for extra in (*RUN_EXTRAS, "audit")
+        for extra in (*RUN_EXTRAS, "audit", "camera")
         for name in names(EXTRAS[extra])
         # Snakemake brings it.
         if name != "snakemake-interface-logger-plugins"
@@ -84,12 +84,12 @@ def test_messages_name_the_extra_of_each_package():
     assert packages == errors.EXTRAS
 
 
-def test_what_a_run_imports_is_installed_and_the_audit_alone_needs_its_extra():
+def test_what_a_run_imports_is_installed_and_audit_and_camera_need_their_extras():
     # Snakemake's plug-ins use its interfaces, which come with it.
     given = REQUIRED | {"elastocal"}
     assert [
         packages for packages in imported(set(RUN) - set(AUDIT)) if not packages & given
-    ] == []
+    ] == [names(EXTRAS["camera"])]
     audit = names(EXTRAS["audit"])
     assert (
         [packages for packages in imported(AUDIT) if not packages & given]

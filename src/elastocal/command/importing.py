@@ -337,8 +337,9 @@ def board(
     file: Annotated[
         Path,
         Argument(
-            help="Samples of MoveIt or easy_handeye (YAML), arrays rvecs and tvecs of"
-            " OpenCV (.npz), or data of robot_calibration (CSV of its bag)."
+            help="A table of elastocal detect, samples of MoveIt or easy_handeye (YAML),"
+            " arrays rvecs and tvecs of OpenCV (.npz), or data of robot_calibration"
+            " (CSV of its bag)."
         ),
     ],
     *,
@@ -383,7 +384,9 @@ def board(
     options = BoardOptions(joints, angles, lengths, sensor)
     poses = read_board_poses(file, arm, options)
     table = tabulate_board_poses(poses, camera)
-    document = describe_board_campaign(folder.resolve().name, arm.joints, camera)
+    document = describe_board_campaign(
+        folder.resolve().name, arm.joints, camera, poses.noise
+    )
     size = f"{format_count(len(table['pose']), 'pose')} of a board, camera {camera}"
     _write_campaign_folder(folder, document, table, arm.joints, robot, [size])
 

@@ -10,6 +10,7 @@ from typer import Option
 from typer.core import TyperGroup
 
 import elastocal
+from elastocal.command.boards import board, detect
 from elastocal.command.campaign import check, diagnose, init
 from elastocal.command.certificate import certificate
 from elastocal.command.comparison import compare
@@ -28,6 +29,8 @@ COMMANDS: dict[Callable[..., None], str] = {
     demo: "",
     init: "campaigns/cell --robot robot.yaml",
     plan: "robot.yaml --folder campaigns/cell --force 200 --pull",
+    board: "--pdf board.pdf",
+    detect: "images/ --board board.yaml --output boards.csv",
     check: "campaigns/cell",
     diagnose: "campaigns/cell",
     correct: "campaigns/cell path.csv --output targets.csv",

@@ -7,6 +7,7 @@ target in the frame of the camera.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,6 +39,8 @@ class BoardPoses:
     rotation : (N, 3, 3) array.
     angles : (N, n) array of joint angles, rad, where the file has them.
     joint_names : names of the joints in the order of `angles`, where the file has them.
+    images : names of the images, where the file has them.
+    noise : as in ``campaign.yaml``, where the file states any.
     """
 
     source: str
@@ -45,6 +48,8 @@ class BoardPoses:
     rotation: np.ndarray
     angles: np.ndarray | None = None
     joint_names: tuple[str, ...] = ()
+    images: tuple[str, ...] = ()
+    noise: Mapping[str, float] | None = None
 
 
 def check_poses(poses: BoardPoses) -> None:
@@ -105,7 +110,9 @@ def tabulate_board_poses(poses: BoardPoses, camera: str) -> dict[str, np.ndarray
     return table | dict(zip(("rx", "ry", "rz"), vector.T, strict=True))
 
 
-def describe_board_campaign(name: str, joints: int, camera: str) -> dict[str, Any]:
+def describe_board_campaign(
+    name: str, joints: int, camera: str, noise: Mapping[str, float] | None = None
+) -> dict[str, Any]:
     """Return ``campaign.yaml`` of poses of a board, with robot.yaml beside it.
 
     Parameters
@@ -113,6 +120,7 @@ def describe_board_campaign(name: str, joints: int, camera: str) -> dict[str, An
     name : name of the campaign.
     joints : number of joints; camera or board sits behind the last one.
     camera : where the camera is, `ON_ROBOT` or `BESIDE_ROBOT`.
+    noise : as in ``campaign.yaml``; None: `NOISE`.
     """
     mount = {"point": f"{joints}DoF", "offset_m": "unknown", "rotation": "unknown"}
     return {
@@ -123,7 +131,7 @@ def describe_board_campaign(name: str, joints: int, camera: str) -> dict[str, An
         "targets": {name_target(camera): mount},
         "compliance": "nominal",
         "declared": ["joint_offset", "link_geometry"],
-        "noise": dict(NOISE),
+        "noise": dict(noise or NOISE),
         "holdout": {"fraction": 0.3, "seed": 1},
     }
 

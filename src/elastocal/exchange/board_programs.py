@@ -9,11 +9,12 @@ import numpy as np
 
 from elastocal.errors import InputError
 from elastocal.exchange.board_poses import BoardPoses, check_poses
+from elastocal.exchange.detected_poses import is_detected_poses, read_detected_poses
 from elastocal.exchange.easy_handeye_samples import (
     is_easy_handeye_samples,
     read_easy_handeye_samples,
 )
-from elastocal.exchange.joint_files import read_joint_angles
+from elastocal.exchange.joint_files import IMAGE, JointAngles, read_joint_angles
 from elastocal.exchange.moveit_samples import is_moveit_samples, read_moveit_samples
 from elastocal.exchange.opencv_poses import read_opencv_poses
 from elastocal.exchange.robot_calibration_csv import (
@@ -25,8 +26,8 @@ from elastocal.io.texts import read_text
 from elastocal.mechanics.robot import Robot
 
 PROGRAMS = (
-    "samples of MoveIt (.yaml) or easy_handeye (.yaml, .samples), arrays of OpenCV"
-    " (.npz), or data of robot_calibration (.csv)"
+    "a table of elastocal detect, samples of MoveIt (.yaml) or easy_handeye (.yaml,"
+    " .samples), arrays of OpenCV (.npz), or data of robot_calibration (.csv)"
 )
 # How archives of numpy begin.
 _ZIP = b"PK"
@@ -66,19 +67,34 @@ def read_board_poses(
         poses = replace(poses, position=1e-3 * poses.position)
     check_poses(poses)
     if options.joints is not None:
-        angles = read_joint_angles(options.joints, robot, options.angles)
-        if len(angles) != len(poses.position):
-            found = f"{len(angles)} rows of joint angles"
-            raise InputError(
-                options.joints, "", found, f"{len(poses.position)}, one for each sample"
-            )
-        poses = replace(poses, angles=angles)
+        joint_angles = read_joint_angles(options.joints, robot, options.angles)
+        rows = _match_rows(poses, joint_angles, options.joints)
+        poses = replace(poses, angles=joint_angles.angles[rows])
     elif poses.angles is not None and options.angles == "deg":
         poses = replace(poses, angles=np.radians(poses.angles))
     if poses.angles is not None and poses.angles.shape[1] != robot.joints:
         found = f"{poses.angles.shape[1]} joint angles in a sample"
         raise InputError(path, "", found, f"{robot.joints}, as the robot has joints")
     return poses
+
+
+def _match_rows(poses: BoardPoses, joint_angles: JointAngles, path: Path) -> np.ndarray:
+    """Find the row of joint angles of each pose: by the image, or else by the order."""
+    count = len(poses.position)
+    if poses.images and joint_angles.images:
+        row_of_image = {image: row for row, image in enumerate(joint_angles.images)}
+        missing = [image for image in poses.images if image not in row_of_image]
+        if missing:
+            found = f"no row of {missing[0]}"
+            raise InputError(path, IMAGE, found, "a row for each image with a pose")
+        return np.array([row_of_image[image] for image in poses.images])
+    if len(joint_angles.angles) != count:
+        found = f"{len(joint_angles.angles)} rows of joint angles"
+        allowed = f"{count}, one for each sample"
+        if poses.images:
+            allowed += f", or a column {IMAGE} with the names of the images"
+        raise InputError(path, "", found, allowed)
+    return np.arange(count)
 
 
 def _read_poses(path: Path, robot: Robot, options: BoardOptions) -> BoardPoses:
@@ -91,7 +107,10 @@ def _read_poses(path: Path, robot: Robot, options: BoardOptions) -> BoardPoses:
     if beginning == _ZIP:
         return read_opencv_poses(path)
     text = read_text(path, _LARGEST_BYTES)
-    if is_robot_calibration(text[: text.find("\n")]):
+    header = text.partition("\n")[0]
+    if is_detected_poses(header):
+        return read_detected_poses(path)
+    if is_robot_calibration(header):
         names = robot.joint_names or ()
         return read_robot_calibration(path, options.sensor, names)
     document = parse_yaml(text, path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +23,31 @@ from elastocal.io.documents import read_document
 from elastocal.mechanics.robot import Robot
 
 _YAML = (".yaml", ".yml")
+# Column of a table that says to which image a row belongs.
+IMAGE = "image"
+
+
+@dataclass(frozen=True)
+class JointAngles:
+    """Joint angles of N samples.
+
+    Attributes
+    ----------
+    angles : (N, n) array, rad.
+    images : name of the image of each row; empty if the file has none.
+    """
+
+    angles: np.ndarray
+    images: tuple[str, ...] = ()
+
+
 _HEADER = "a header with q1, q2 and so on, or the names of the robot's joints"
 
 
 def read_joint_angles(
     path: str | Path, robot: Robot, unit: str | None = None
-) -> np.ndarray:
-    """Read the joint angles of all samples, (N, n), rad.
+) -> JointAngles:
+    """Read the joint angles of all samples.
 
     Parameters
     ----------
@@ -42,7 +61,7 @@ def read_joint_angles(
         If a joint is missing or its unit is not stated.
     """
     if Path(path).suffix.lower() in _YAML:
-        return _read_joint_states(read_document(path), path, robot)
+        return JointAngles(_read_joint_states(read_document(path), path, robot))
 
     def is_header(cells: Sequence[str]) -> bool:
         names = {recognize_column(cell)[0] for cell in cells} - {None}
@@ -57,7 +76,11 @@ def read_joint_angles(
         raise InputError(path, "header", f"no column {missing[0]!r}", _HEADER)
     options = {"angles": unit} if unit else {}
     units = find_units(text, columns, wanted, stated_units, options, robot)
-    return text.cells(columns, find_scales(units)).matrix(wanted)
+    angles = text.cells(columns, find_scales(units)).matrix(wanted)
+    if IMAGE not in text.columns:
+        return JointAngles(angles)
+    images = text.cells({IMAGE: IMAGE}, {}).texts(IMAGE)
+    return JointAngles(angles, tuple(images))
 
 
 def _read_joint_states(document: Any, path: str | Path, robot: Robot) -> np.ndarray:
