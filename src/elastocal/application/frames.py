@@ -21,6 +21,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from elastocal.application.left_out import LeftOutEffects
 
 ROBOT = "robot"
@@ -32,6 +34,8 @@ FRAMES = {
 # Parameters of a placement: shift and rotation of the base, offset and rotation at the
 # end effector, with three components each.
 PLACEMENT_PARAMETERS = 12
+# Number of poses whose fields of displacements are copied at once.
+_CHUNK = 500
 
 
 @dataclass(frozen=True)
@@ -126,12 +130,39 @@ def fit_placement(
     for rows, first, last in (positions, orientations):
         parameters = np.flatnonzero(free[first:last]) + first
         if len(parameters):
-            residual = (displacements - columns @ fitted)[:, rows].reshape(
-                3 * len(displacements), displacements.shape[2]
+            design = columns[:, rows, parameters]
+            residuals = (
+                displacements[chunk, rows] - columns[chunk, rows] @ fitted
+                for chunk in _split_poses(len(design))
             )
-            design = columns[:, rows, parameters].reshape(len(residual), -1)
-            fitted[parameters] = np.linalg.lstsq(design, residual, rcond=None)[0]
+            fitted[parameters] = _solve_least_squares(design, residuals)
     return fitted
+
+
+def _solve_least_squares(
+    design: np.ndarray, right_sides: Iterable[np.ndarray]
+) -> np.ndarray:
+    """Solve least-squares problems (p, K) of one design (N, 3, p).
+
+    The right sides (N, 3, K) come in blocks of `_split_poses`, so that no copy of all of
+    them is in memory.
+    """
+    rows = design.shape[0] * design.shape[1]
+    # Singular values below the rounding of the largest one count as zero.
+    rounding = np.finfo(float).eps * max(rows, design.shape[2])
+    inverse = np.linalg.pinv(design.reshape(rows, -1), rcond=rounding)
+    inverse = inverse.reshape(-1, *design.shape[:2])
+    products = [
+        np.tensordot(inverse[:, chunk], right, axes=2)
+        for chunk, right in zip(_split_poses(len(design)), right_sides, strict=True)
+    ]
+    solution: np.ndarray = np.sum(products, axis=0)
+    return solution
+
+
+def _split_poses(count: int) -> list[slice]:
+    """Blocks of poses whose fields are in memory at once."""
+    return [slice(start, start + _CHUNK) for start in range(0, count, _CHUNK)]
 
 
 def select_free_parameters(
