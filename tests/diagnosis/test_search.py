@@ -1,5 +1,7 @@
 """The search, on problems small enough for all models to be enumerated."""
 
+import gc
+import weakref
 from dataclasses import replace
 from itertools import combinations
 from types import SimpleNamespace
@@ -137,6 +139,19 @@ def test_a_search_finds_a_good_model_that_it_is_told_even_if_no_step_leads_there
     assert best.log_odds > best_untold + 5
 
 
+def test_statistics_are_released_with_their_problem():
+    """The largest arrays of a diagnosis would otherwise stay until Python looks for
+    objects that refer to each other."""
+    terms = tuple(make_term("offset", (n,), n) for n in range(8))
+    problem, _ = make_problem(make_rows(5, poses=14, candidates=8), terms, tau=[0.0])
+    search_models(problem)
+    statistics = weakref.ref(problem.initial_search.statistics)
+    gc.disable()
+    del problem
+    gc.enable()
+    assert statistics() is None
+
+
 def test_gross_errors_that_lead_are_added_in_few_steps():
     rows = make_rows(5, poses=14, candidates=8)
     candidates = rows.candidates.copy()
@@ -146,7 +161,7 @@ def test_gross_errors_that_lead_are_added_in_few_steps():
     terms = tuple(make_term(GROSS_ERROR, ("row", n), n) for n in range(6))
     terms += (make_term("offset", (1,), 6), make_term("offset", (2,), 7))
     problem, _ = make_problem(rows, terms, tau=[0.0])
-    search = search_from_starts(problem.initial_search, [()])
+    search = search_from_starts(problem, problem.initial_search, [()])
     wrong = tuple(range(6))
     assert search.find_best_model() == wrong
     posterior = search.weigh()

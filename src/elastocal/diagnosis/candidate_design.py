@@ -192,10 +192,10 @@ class CandidateDesign:
 
     @property
     def without_rows(self) -> CandidateDesign:
-        """The same with the results of the search problem, but without the arrays that
-        grow with the measurements."""
+        """The same with the search problem, but without its first search and without the
+        arrays that grow with the measurements."""
         results = _Precomputed(
-            self.products.without_rows, self.problem, self.pose_std_error_rad
+            self.products.without_rows, replace(self.problem), self.pose_std_error_rad
         )
         return replace(self, whitened=replace(self.whitened), precomputed=results)
 

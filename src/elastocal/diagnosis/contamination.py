@@ -408,11 +408,11 @@ def _search_with_gross_errors(
         ),
         key=lambda start: search.evaluate(start).log_odds,
     )
-    search = search_from_starts(search, [(), *ranked[-1:]])
+    search = search_from_starts(problem, search, [(), *ranked[-1:]])
     best = search.find_best_model()
     effects = tuple(number for number in best if terms[number].mechanism != GROSS_ERROR)
     if effects and effects != best:
-        search = search_from_starts(search, [effects])
+        search = search_from_starts(problem, search, [effects])
     return _compute_probabilities(problem, search.weigh(), basis)
 
 

@@ -102,8 +102,12 @@ class SearchProblem:
 
     @cached_property
     def initial_search(self) -> BeamSearch:
-        """A search that has met the declared model and each single term."""
-        return BeamSearch(self)
+        """A search that has met the declared model and each single term.
+
+        It refers to a copy of this problem: objects that refer to each other are
+        released late, and with them the statistics of former searches.
+        """
+        return BeamSearch(replace(self), self.blocks)
 
     def scaled_columns(
         self, numbers: Sequence[int], scales: Sequence[float] | np.ndarray
@@ -222,9 +226,11 @@ def search_models(
     return search.weigh()
 
 
-def search_from_starts(search: BeamSearch, starts: Iterable[TermSet]) -> BeamSearch:
-    """Search the models from several starts, each by itself, and return a search that
-    has met all their models beside those that `search` had met.
+def search_from_starts(
+    problem: SearchProblem, search: BeamSearch, starts: Iterable[TermSet]
+) -> BeamSearch:
+    """Search the models of a problem from several starts, each by itself, and return a
+    search that has met all their models beside those that `search` had met.
 
     Single additions and deletions may not lead from one good model to another: between
     many gross errors and the one effect that explains them all, every model is worse
@@ -232,7 +238,7 @@ def search_from_starts(search: BeamSearch, starts: Iterable[TermSet]) -> BeamSea
     """
     merged = search.duplicate()
     for start in starts:
-        from_start = search.problem.initial_search.duplicate()
+        from_start = problem.initial_search.duplicate()
         # The neighbours of a model that another start led to are known.
         from_start.extended |= merged.extended
         from_start.evaluate(start)
@@ -258,9 +264,8 @@ def select_pose_errors(
     statistics : of the declared model alone
     settings : settings of the diagnosis
     """
-    weights = BeamSearch(
-        SearchProblem(statistics, (), settings)
-    ).empty_evidence.log_pose_posterior
+    problem = SearchProblem(statistics, (), settings)
+    weights = problem.initial_search.empty_evidence.log_pose_posterior
     largest_likely = np.flatnonzero(weights > weights.max() + NEGLIGIBLE_LOG_WEIGHT)[-1]
     largest = max(largest_likely, np.argmax(weights) + POSE_ERROR_REACH)
     return np.arange(len(weights)) <= largest
@@ -268,6 +273,11 @@ def select_pose_errors(
 
 class BeamSearch:
     """A search over sets of terms, with all models that it has met.
+
+    Parameters
+    ----------
+    problem : statistics and terms
+    blocks : the terms by their number of columns
 
     Attributes
     ----------
@@ -280,14 +290,14 @@ class BeamSearch:
     extended : models that were extended by every term
     """
 
-    def __init__(self, problem: SearchProblem) -> None:
+    def __init__(self, problem: SearchProblem, blocks: list[TermBlock]) -> None:
         self.problem = problem
         self.statistics = problem.statistics
         self.single_term_log_prior = np.array(
             [problem.prior.log_odds_change(term, 0) for term in problem.terms]
         )
         self._log_pose = problem.log_pose
-        self._blocks = problem.blocks
+        self._blocks = blocks
         self._log_weights = np.array(
             [problem.grid.log_weights_of(term) for term in problem.terms]
         ).reshape(-1, len(problem.grid.scales))
