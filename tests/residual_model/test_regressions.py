@@ -135,3 +135,21 @@ def test_a_regression_without_queries_predicts_no_rows(name):
     nowhere = inputs.select(np.zeros(60, bool))
     assert predictor.mean(nowhere).shape == (0, 3)
     assert predictor.std(nowhere).shape == (0, 3)
+
+
+@pytest.mark.parametrize("name", ["ridge_harmonics", "two_joints"])
+def test_joined_inputs_are_fitted_as_the_same_observations_at_once(name):
+    """The cross-validation adds up the Gram matrices of folds."""
+    inputs, residual = made_inputs(700, seed=1, joints=4)
+    unseen, _ = made_inputs(30, seed=2, joints=4)
+    parts = [inputs.select(slice(0, 600)), inputs.select(slice(600, 700))]
+    joined = Inputs.join(parts)
+    np.testing.assert_array_equal(joined.columns, inputs.columns)
+    # Parts that were fitted before have stored matrices.
+    for part, rows in zip(parts, np.split(residual, [600]), strict=True):
+        fit_first_setting(name, part, rows)
+    at_once, of_parts = (
+        fit_first_setting(name, fitted, residual).mean(unseen)
+        for fitted in (inputs, joined)
+    )
+    np.testing.assert_allclose(of_parts, at_once, rtol=1e-9, atol=1e-15)

@@ -9,7 +9,7 @@ predictor for each setting.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, lru_cache, partial
+from functools import cache, cached_property, lru_cache, partial
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,7 @@ from elastocal.io.plugins import load_plugins
 from elastocal.residual_model.laws import DisplacementLaw, ProcessLaw, Tree, TreesLaw
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 
     from elastocal.residual_model.laws import Law
 
@@ -78,11 +78,25 @@ class Inputs:
     jacobian : (M, 3, C) array, base axes
         Displacement of the target by the joints first, then by base and links, m per rad
         or m; then by the effects of the model, see `selection.build_inputs`.
+    parts : tuple of Inputs
+        From which these inputs were joined; empty if they were not.
     """
 
     joint_angles: np.ndarray
     covariates: np.ndarray
     jacobian: np.ndarray
+    parts: tuple[Inputs, ...] = ()
+
+    @classmethod
+    def join(cls, parts: Sequence[Inputs]) -> Inputs:
+        """Join the observations of some parts, whose Gram matrices serve every union of
+        them."""
+        return cls(
+            np.concatenate([part.joint_angles for part in parts]),
+            np.concatenate([part.covariates for part in parts]),
+            np.concatenate([part.jacobian for part in parts]),
+            tuple(parts),
+        )
 
     def __len__(self) -> int:
         return len(self.joint_angles)
@@ -97,6 +111,43 @@ class Inputs:
         return Inputs(
             self.joint_angles[chosen], self.covariates[chosen], self.jacobian[chosen]
         )
+
+    @cached_property
+    def _grams(self) -> dict[Hashable, np.ndarray]:
+        """Gram matrices of these observations, by the name of their columns."""
+        return {}
+
+    def sum_gram(
+        self, columns: Hashable, compute: Callable[[Inputs], np.ndarray]
+    ) -> np.ndarray:
+        """Sum a Gram matrix over the observations, some at a time, and store it.
+
+        Joined inputs add up the stored matrices of their parts. The cross-validation
+        fits unions of the same few folds, again and again.
+
+        Parameters
+        ----------
+        columns : name of the columns
+        compute : returns the matrix of some of the observations
+        """
+        if self.parts:
+            grams = [part.sum_gram(columns, compute) for part in self.parts]
+            return np.asarray(np.sum(grams, axis=0))
+        if columns not in self._grams:
+            chunks = _split_into_chunks(self)
+            self._grams[columns] = np.sum(
+                [compute(self.select(chunk)) for chunk in chunks], axis=0
+            )
+        return self._grams[columns]
+
+    @cached_property
+    def principal_axes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Eigenvalues (C,), not negative, and eigenvectors (C, C) of the Gram matrix of
+        the Jacobian's columns."""
+        eigenvalues, axes = np.linalg.eigh(
+            self.sum_gram("jacobian", _compute_jacobian_gram)
+        )
+        return np.maximum(eigenvalues, 0.0), axes
 
 
 @dataclass(frozen=True)
@@ -182,11 +233,11 @@ class _GeometryBlock:
     projection: np.ndarray
 
     @classmethod
-    def from_products(cls, gram: np.ndarray, projection: np.ndarray) -> _GeometryBlock:
-        """Diagonalize the Gram matrix (G, G), given the products (G,) of the columns with
-        the residual."""
-        eigenvalues, axes = np.linalg.eigh(gram)
-        return cls(np.maximum(eigenvalues, 0.0), axes, axes.T @ projection)
+    def from_inputs(cls, inputs: Inputs, residual: np.ndarray) -> _GeometryBlock:
+        """Project residuals (M, 3) on the principal axes of the Jacobian's columns."""
+        eigenvalues, axes = inputs.principal_axes
+        columns = inputs.jacobian.reshape(residual.size, -1)
+        return cls(eigenvalues, axes, axes.T @ (columns.T @ residual.ravel()))
 
     def mean_square(self, gram: np.ndarray) -> float:
         """Mean square of all columns, with the others' Gram matrix (D, D)."""
@@ -281,40 +332,32 @@ def fit_ridge_harmonics(
 
     # The same poses are predicted with one penalty after the other.
     @lru_cache(maxsize=2)
-    def build_columns(source: Inputs, start: int, orders: int) -> np.ndarray:
-        chunk = source.select(slice(start, start + _CHUNK))
-        harmonics = compute_harmonic_columns(chunk, orders)
-        return np.concatenate([chunk.jacobian, harmonics], axis=2)
+    def evaluate(queries: Inputs, orders: int) -> np.ndarray:
+        return compute_harmonics(queries.joint_angles, orders)
 
     max_orders = max(setting["orders"] for setting in settings)
     joints = inputs.joint_angles.shape[1]
     split = inputs.jacobian.shape[2]
-    size = split + 2 * max_orders * joints
-    gram = np.zeros((size, size))
-    projection = np.zeros(size)
-    for chunk in _split_into_chunks(inputs):
-        rows = build_columns(inputs, chunk.start, max_orders).reshape(-1, size)
-        gram += rows.T @ rows
-        projection += rows.T @ residual[chunk].ravel()
-    geometry = _GeometryBlock.from_products(gram[:split, :split], projection[:split])
-    cross_gram = geometry.axes.T @ gram[:split, split:]
+    gram = inputs.sum_gram(
+        ("harmonics", max_orders), partial(_compute_harmonic_gram, orders=max_orders)
+    )
+    projection = _project_on_harmonics(inputs, residual, max_orders)
+    geometry = _GeometryBlock.from_inputs(inputs, residual)
+    cross_gram = geometry.axes.T @ gram[:split]
 
     # Settings of the same orders follow each other.
     @lru_cache(maxsize=1)
     def build_dual(orders: int) -> _DualRidge:
-        chunks = [
-            build_columns(inputs, chunk.start, orders)
-            for chunk in _split_into_chunks(inputs)
-        ]
-        columns = np.concatenate(chunks).reshape(residual.size, -1)
-        return _DualRidge.from_rows(columns, residual.ravel())
+        columns = [inputs.jacobian, compute_harmonic_columns(inputs, orders)]
+        rows = np.concatenate(columns, axis=2).reshape(residual.size, -1)
+        return _DualRidge.from_rows(rows, residual.ravel())
 
     for setting in settings:
         # Lower orders come first among the harmonics, so that fewer orders are the first
         # columns.
         orders = setting["orders"]
         end = split + 2 * orders * joints
-        harmonic_gram = gram[split:end, split:end]
+        harmonic_gram = gram[split:end, : end - split]
         penalty = setting["penalty"] * geometry.mean_square(harmonic_gram)
         if residual.size < end:
             coefficients = build_dual(orders).solve(penalty)
@@ -322,7 +365,7 @@ def fit_ridge_harmonics(
             coefficients = geometry.solve_ridge(
                 cross_gram[:, : end - split],
                 harmonic_gram,
-                projection[split:end],
+                projection[: end - split],
                 penalty,
             ).coefficients
 
@@ -331,13 +374,62 @@ def fit_ridge_harmonics(
             coefficients: np.ndarray = coefficients,
             orders: int = orders,
         ) -> np.ndarray:
-            return _concatenate(
-                build_columns(queries, chunk.start, orders) @ coefficients
-                for chunk in _split_into_chunks(queries)
+            geometric, amplitudes = np.split(coefficients, [split])
+            deviations = np.einsum(
+                "mwn,wn->mn",
+                evaluate(queries, orders),
+                amplitudes.reshape(2 * orders, joints),
             )
+            by_joint = queries.jacobian[:, :, :joints] @ deviations[..., None]
+            return queries.jacobian @ geometric + by_joint[..., 0]
 
         law = partial(_express_harmonics, coefficients, orders, joints)
         yield Predictor(mean, law=law)
+
+
+def _compute_jacobian_gram(inputs: Inputs) -> np.ndarray:
+    """Gram matrix (C, C) of the Jacobian's columns."""
+    rows = inputs.jacobian.reshape(-1, inputs.jacobian.shape[2])
+    return rows.T @ rows
+
+
+def _compute_harmonic_gram(inputs: Inputs, orders: int) -> np.ndarray:
+    """Products (C + D, D) of the Jacobian's columns and of the harmonics with the
+    harmonics."""
+    columns = compute_harmonic_columns(inputs, orders)
+    return _multiply_with_all(inputs.jacobian, columns)
+
+
+def _compute_pair_gram(inputs: Inputs, pair: tuple[int, int]) -> np.ndarray:
+    """Products (C + D, D) of the Jacobian's columns and of the functions of two joints'
+    angles with the latter."""
+    joints = np.arange(inputs.joint_angles.shape[1])
+    return _multiply_with_all(
+        inputs.jacobian, compute_pair_columns(inputs, pair, joints)
+    )
+
+
+def _multiply_with_all(jacobian: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Products (C + D, D) of the columns of a Jacobian (M, 3, C) and of some columns
+    (M, 3, D) with the latter."""
+    right = columns.reshape(-1, columns.shape[2])
+    left = jacobian.reshape(-1, jacobian.shape[2])
+    return np.concatenate([left.T @ right, right.T @ right])
+
+
+def _project_on_harmonics(
+    inputs: Inputs, residual: np.ndarray, orders: int
+) -> np.ndarray:
+    """Products (D,) of the columns of `compute_harmonic_columns` with residuals (M, 3)."""
+    harmonics = compute_harmonics(inputs.joint_angles, orders)
+    along_joints = _project_on_joints(inputs, residual)
+    return np.einsum("mwn,mn->wn", harmonics, along_joints).ravel()
+
+
+def _project_on_joints(inputs: Inputs, residual: np.ndarray) -> np.ndarray:
+    """Products (M, n) of residuals (M, 3) with the displacement by each joint."""
+    joint_jacobian = inputs.jacobian[:, :, : inputs.joint_angles.shape[1]]
+    return np.einsum("maj,ma->mj", joint_jacobian, residual)
 
 
 def _express_harmonics(
@@ -377,14 +469,18 @@ def fit_two_joints(
     """
     joints = np.arange(inputs.joint_angles.shape[1])
     target = residual.ravel()
-    jacobian = inputs.jacobian.reshape(residual.size, -1)
-    geometry = _GeometryBlock.from_products(jacobian.T @ jacobian, jacobian.T @ target)
+    split = inputs.jacobian.shape[2]
+    geometry = _GeometryBlock.from_inputs(inputs, residual)
+    along_joints = _project_on_joints(inputs, residual)
     largest_likelihood = -np.inf
     for pair in combinations(range(len(joints)), 2):
-        rows = compute_pair_columns(inputs, pair, joints).reshape(residual.size, -1)
-        cross_gram = geometry.axes.T @ (jacobian.T @ rows)
-        gram = rows.T @ rows
-        projection = rows.T @ target
+        products = inputs.sum_gram(
+            ("pair", pair), partial(_compute_pair_gram, pair=pair)
+        )
+        cross_gram = geometry.axes.T @ products[:split]
+        gram = products[split:]
+        functions = compute_pair_functions(inputs.joint_angles[:, pair])
+        projection = (along_joints.T @ functions).ravel()
         for penalty in _PENALTIES * geometry.mean_square(gram):
             solution = geometry.solve_ridge(cross_gram, gram, projection, penalty)
             likelihood = _profile_likelihood(target, solution)
@@ -395,7 +491,7 @@ def fit_two_joints(
 
     def mean(queries: Inputs) -> np.ndarray:
         columns = compute_pair_columns(queries, best_pair, joints)
-        geometric, by_pair = np.split(coefficients, [jacobian.shape[1]])
+        geometric, by_pair = np.split(coefficients, [split])
         return queries.jacobian @ geometric + columns @ by_pair
 
     yield Predictor(
@@ -713,12 +809,19 @@ def compute_harmonic_columns(inputs: Inputs, orders: int) -> np.ndarray:
 
     Returns a (M, 3, 2 n orders) array, lower orders first.
     """
-    waves = np.repeat(np.exp(1j * inputs.joint_angles)[:, None], orders, axis=1)
+    functions = compute_harmonics(inputs.joint_angles, orders)
+    joint_jacobian = inputs.jacobian[:, :, : inputs.joint_angles.shape[1]]
+    columns = joint_jacobian[:, :, None] * functions[:, None]
+    return columns.reshape(len(inputs), 3, np.prod(columns.shape[2:]))
+
+
+def compute_harmonics(joint_angles: np.ndarray, orders: int) -> np.ndarray:
+    """Compute sine and cosine of the multiples of each angle (M, n), lower orders first:
+    (M, 2 orders, n) array."""
+    waves = np.repeat(np.exp(1j * joint_angles)[:, None], orders, axis=1)
     harmonics = np.cumprod(waves, axis=1)
     functions = np.stack([harmonics.imag, harmonics.real], axis=2)
-    joint_jacobian = inputs.jacobian[:, :, : inputs.joint_angles.shape[1]]
-    columns = joint_jacobian[:, :, None, None] * functions[:, None]
-    return columns.reshape(len(inputs), 3, np.prod(columns.shape[2:]))
+    return functions.reshape(len(joint_angles), 2 * orders, joint_angles.shape[1])
 
 
 def compute_pair_columns(

@@ -55,7 +55,7 @@ from elastocal.verdict import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.least_squares import Fit
@@ -505,6 +505,37 @@ def _choose_on_training(
     return choose_regression(names, inputs, training, plan.seed)
 
 
+@dataclass(frozen=True)
+class _FoldedInputs:
+    """Inputs of K folds, of which unions are fitted.
+
+    Attributes
+    ----------
+    parts : inputs of each fold
+    observations : indices of their observations, int arrays
+    """
+
+    parts: list[Inputs]
+    observations: list[np.ndarray]
+
+    @classmethod
+    def of(cls, inputs: Inputs, folds: TrainingFolds) -> _FoldedInputs:
+        """Divide the inputs of the training observations by their folds."""
+        members = [folds.fold == number for number in range(folds.count)]
+        return cls(
+            [inputs.select(mask) for mask in members],
+            [np.flatnonzero(mask) for mask in members],
+        )
+
+    def join_without(self, left_out: Collection[int]) -> tuple[Inputs, np.ndarray]:
+        """Join all folds but some; the indices of the observations as well."""
+        numbers = [n for n in range(len(self.parts)) if n not in left_out]
+        return (
+            Inputs.join([self.parts[number] for number in numbers]),
+            np.concatenate([self.observations[number] for number in numbers]),
+        )
+
+
 def choose_regression(
     names: Sequence[str], inputs: Inputs, folds: TrainingFolds, seed: int
 ) -> RegressionChoice:
@@ -538,24 +569,11 @@ def choose_regression(
         for name in settings
         for setting in list_regressions()[name].settings
     ]
-    products = _cross_validate(settings, inputs, folds, seed)
+    folded = _FoldedInputs.of(inputs, folds)
+    products = _cross_validate(settings, folded, folds, seed)
     # Residuals of the model fitted without the fold of each observation.
     residual = folds.residual_without[folds.fold, np.arange(len(folds.fold))]
-    predicted = np.zeros_like(residual)
-    std = np.full_like(residual, np.nan)
-    for number in range(folds.count):
-        best = _find_best_candidate(products[number].sum(axis=0))
-        if best is None:
-            continue
-        left_out = folds.fold == number
-        predictor = _fit_setting(
-            *candidates[best],
-            inputs.select(~left_out),
-            folds.residual_without[number, ~left_out],
-            seed,
-        )
-        predicted[left_out] = predictor.mean(inputs.select(left_out))
-        std[left_out] = predictor.std(inputs.select(left_out))
+    predicted, std = _predict_outer_folds(candidates, products, folded, folds, seed)
     gain = estimate_gain(
         np.bincount(folds.configuration, (residual * predicted).sum(axis=1)),
         np.bincount(folds.configuration, (predicted**2).sum(axis=1)),
@@ -576,6 +594,46 @@ def choose_regression(
     )
 
 
+def _predict_outer_folds(
+    candidates: Sequence[tuple[str, Setting]],
+    products: np.ndarray,
+    folded: _FoldedInputs,
+    folds: TrainingFolds,
+    seed: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Predict each fold by the regression that the other folds choose and fit.
+
+    Parameters
+    ----------
+    candidates : regressions and settings
+    products : result of `_cross_validate`
+    folded, folds : inputs and residuals
+    seed : of the regressions
+
+    Returns
+    -------
+    predicted, std : (M, 3) arrays, m
+        Zero, and not a number, if the other folds choose none.
+    """
+    predicted = np.zeros_like(folds.residual)
+    std = np.full_like(folds.residual, np.nan)
+    for number in range(folds.count):
+        best = _find_best_candidate(products[number].sum(axis=0))
+        if best is None:
+            continue
+        training_inputs, training = folded.join_without((number,))
+        predictor = _fit_setting(
+            *candidates[best],
+            training_inputs,
+            folds.residual_without[number, training],
+            seed,
+        )
+        left_out = folded.observations[number]
+        predicted[left_out] = predictor.mean(folded.parts[number])
+        std[left_out] = predictor.std(folded.parts[number])
+    return predicted, std
+
+
 def _list_settings(
     name: str, inputs: Inputs, residual: np.ndarray, seed: int
 ) -> Sequence[Setting]:
@@ -592,7 +650,7 @@ def _list_settings(
 
 def _cross_validate(
     settings: Mapping[str, Sequence[Setting]],
-    inputs: Inputs,
+    folded: _FoldedInputs,
     folds: TrainingFolds,
     seed: int,
 ) -> np.ndarray:
@@ -602,15 +660,12 @@ def _cross_validate(
     residuals and with themselves, by the outer fold and by the predicted fold.
     """
     candidates = sum(map(len, settings.values()))
-    members = [folds.fold == number for number in range(folds.count)]
-    inputs_by_fold = [inputs.select(mask) for mask in members]
     products = np.zeros((folds.count, folds.count, candidates, 2))
     for pair in combinations(range(folds.count), 2):
         # Residuals of a model fitted without both folds, to first order in the changes
         # that leaving out each of them causes.
         residual = folds.residual_without[list(pair)].sum(axis=0) - folds.residual
-        training = ~np.isin(folds.fold, pair)
-        training_inputs = inputs.select(training)
+        training_inputs, training = folded.join_without(pair)
         predictors = (
             predictor
             for name in settings
@@ -620,9 +675,9 @@ def _cross_validate(
         )
         for number, predictor in enumerate(predictors):
             for outer, predicted in (pair, pair[::-1]):
-                mean = predictor.mean(inputs_by_fold[predicted])
+                mean = predictor.mean(folded.parts[predicted])
                 products[outer, predicted, number] = (
-                    (residual[members[predicted]] * mean).sum(),
+                    (residual[folded.observations[predicted]] * mean).sum(),
                     (mean**2).sum(),
                 )
     return products
