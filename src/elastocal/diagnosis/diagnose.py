@@ -803,13 +803,18 @@ def _refuse_adoption(
     if not evidence.expected_to_help:
         return [adoption.TOO_UNCERTAIN]
     sample = subset.search_sample
+    declared, full_model = models
     if sample is not subset.case.observations:
-        declared, full_model = models
-        models = (
-            _refit_from(declared, sample, declared.noise, INTERMEDIATE_TOLERANCE),
-            _refit_from(full_model, sample, full_model.noise, INTERMEDIATE_TOLERANCE),
+        full_model = _refit_from(
+            full_model, sample, full_model.noise, INTERMEDIATE_TOLERANCE
         )
-    return adoption.describe_missing_gain(*models, sample, settings)
+    kept = _refit_declared(evidence, declared, sample)
+    predicted = model_averaging.predict_gain(
+        evidence.design.problem, evidence.posterior, evidence.named_model
+    )
+    return adoption.describe_missing_gain(
+        (kept, full_model), sample, predicted, settings
+    )
 
 
 def _refit_declared(

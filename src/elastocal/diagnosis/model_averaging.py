@@ -74,6 +74,25 @@ class SumOfSquares(NamedTuple):
     extra: float
 
 
+class PredictedGain(NamedTuple):
+    """Expected gain of a model over the declared one.
+
+    Attributes
+    ----------
+    share
+        What squared errors fall by, as a share of the squared displacements that the
+        model adds: one if the model is certain, negative if it is probably wrong.
+    std_error
+        Standard error of the share.
+    squares
+        Sum of squares of the whitened displacements.
+    """
+
+    share: float
+    std_error: float
+    squares: float
+
+
 def average_models(
     design: CandidateDesign,
     posterior: Posterior,
@@ -186,12 +205,19 @@ def is_expected_to_help(
     problem: SearchProblem, posterior: Posterior, model: ScoredModel
 ) -> bool:
     """Decide whether a model is expected to predict better than the declared one, at
-    poses like those measured.
+    poses like those measured: the interval of the gain has to exclude zero."""
+    gain = predict_gain(problem, posterior, model)
+    return bool(gain.share > problem.settings.useful * gain.std_error)
+
+
+def predict_gain(
+    problem: SearchProblem, posterior: Posterior, model: ScoredModel
+) -> PredictedGain:
+    """Predict by how much a model lowers squared errors, at poses like those measured.
 
     With d the displacement that the model predicts and E d its mean over all models,
     adding d lowers the expected squared error by 2 d'E d - d'd. Under the model alone
-    that gain has at most the variance 4 d'd of a least-squares estimate. The interval
-    of the gain has to exclude zero.
+    that gain has at most the variance 4 d'd of a least-squares estimate.
     """
     gram = problem.statistics.gram[0]
     coefficients = _compute_coefficients(problem, model)
@@ -199,9 +225,12 @@ def is_expected_to_help(
     for likely_model, probability in _select_likely_models(posterior, model):
         mean += probability * _compute_coefficients(problem, likely_model)
     variance_factor = max(predict_reduced_chi_square(problem, model), 1.0)
-    std_error = 2.0 * np.sqrt(coefficients @ gram @ coefficients * variance_factor)
-    gain = coefficients @ gram @ (2.0 * mean - coefficients)
-    return bool(gain > problem.settings.useful * std_error)
+    squares = float(coefficients @ gram @ coefficients)
+    if squares <= 0.0:
+        return PredictedGain(0.0, np.inf, 0.0)
+    share = coefficients @ gram @ (2.0 * mean - coefficients) / squares
+    std_error = 2.0 * np.sqrt(variance_factor / squares)
+    return PredictedGain(float(share), float(std_error), squares)
 
 
 def compute_between_model_squares(

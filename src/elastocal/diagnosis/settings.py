@@ -55,6 +55,7 @@ class Settings:
     width_loss: float = _DEFAULT.width_loss
     useful: float = _DEFAULT.useful
     adoption_groups: int = _DEFAULT.adoption_groups
+    useless_prediction: float = _DEFAULT.useless_prediction
     prior_share: float = _DEFAULT.prior_share
     law_tolerance: float = _DEFAULT.law_tolerance
     confusable_share: float = _DEFAULT.confusable_share
