@@ -24,6 +24,8 @@ OPTIONAL_COLUMNS = {
     "temperature_c": ("temperature_c",),
     "u95_m": ("u95_m",),
 }
+# Columns of campaigns with several kinds of measurement alone.
+COLUMNS_OF_KINDS = ("channel", "spread")
 REQUIRED_COLUMNS = (
     "session",
     "pose",
@@ -67,7 +69,7 @@ def test_selected_measurements_come_in_the_order_of_the_index(measurements):
 def test_every_number_is_in_the_column_of_its_name(cell, measurements):
     columns = tabulate_measurements(measurements)
     optional = [name for names in OPTIONAL_COLUMNS.values() for name in names]
-    assert [*columns] == [*REQUIRED_COLUMNS, *optional]
+    assert [*columns] == [*REQUIRED_COLUMNS, *optional, *COLUMNS_OF_KINDS]
     for name in [*columns.keys() & cell.table.keys() - {"target"}]:
         np.testing.assert_array_equal(columns[name], cell.table[name], err_msg=name)
     assert_same(build_measurements(columns), measurements)
@@ -79,10 +81,10 @@ def test_an_array_that_was_not_measured_is_written_as_empty_columns(
 ):
     columns = tabulate_measurements(replace(measurements, **{array: None}))
     empty = {name for name, values in columns.items() if np.isnan(values).any()}
-    assert empty == set(OPTIONAL_COLUMNS[array])
+    assert empty == {*OPTIONAL_COLUMNS[array], *COLUMNS_OF_KINDS}
     read_back = vars(build_measurements(columns))
     missing = [name for name, values in read_back.items() if values is None]
-    assert missing == [array]
+    assert missing == [array, *COLUMNS_OF_KINDS]
 
 
 def test_residuals_are_written_next_to_the_measurements_at_the_given_positions(

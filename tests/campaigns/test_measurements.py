@@ -88,7 +88,7 @@ def test_a_missing_column_is_refused(cell, missing):
     [
         ("Load", "'load'?"),
         ("temperature", "'temperature_c'?"),
-        ("q4", "q3, u95_m, for 3 joints"),
+        ("q4", "q3, u95_m, kind, feature, value, for 3 joints"),
     ],
 )
 def test_an_unknown_column_is_refused_with_the_closest_name(cell, name, hint):

@@ -25,6 +25,13 @@ from elastocal.application.frames import (
     select_free_parameters,
 )
 from elastocal.application.left_out import LeftOutEffects, is_left_out
+from elastocal.fitting.model import (
+    compute_residuals,
+    evaluate_conditions,
+    list_parameters,
+    place_in_session,
+    predict,
+)
 from elastocal.fitting.noise import estimate_joint_repeatability
 from elastocal.mechanics.kinematics import compute_pose_differences
 
@@ -70,7 +77,39 @@ def calibrate_on_case(
         )
         noise = replace(noise, joint_rad=np.full(robot.joints, repeatability_rad))
     fit = CampaignFit(model, estimate, covariance, case.observations)
+    if model.measuring is not None:
+        fit = _leave_features(fit)
     return calibrate_by_campaign_fit(robot, fit, noise, residual_model, dof)
+
+
+def _leave_features(fit: CampaignFit) -> CampaignFit:
+    """Return the fit as if positions had been measured where the features were touched.
+
+    A corrected robot needs no features; its covariance is marginal over them.
+    """
+    model = fit.model
+    estimate = fit.estimate
+    owners = [owner for owner, _ in list_parameters(model, estimate)]
+    kept = np.array([not owner.startswith("feature ") for owner in owners], bool)
+    observations = fit.observations
+    conditions = evaluate_conditions(model, estimate, observations.states)
+    position, rotation = predict(model, estimate, observations, conditions)
+    if model.rows > 1:
+        residual = compute_residuals(model, estimate, observations, conditions)
+        position = position + residual[:, :3]
+    placed = place_in_session(estimate, observations, position, rotation)
+    return CampaignFit(
+        replace(model, measuring=None, rows=6 if model.has_orientations else 3),
+        replace(estimate, features=()),
+        fit.covariance[np.ix_(kept, kept)],
+        replace(
+            observations,
+            position=placed.position,
+            rotation=placed.rotation if model.has_orientations else None,
+            channel=None,
+            spread=None,
+        ),
+    )
 
 
 def calibrate_by_campaign_fit(

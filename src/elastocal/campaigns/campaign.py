@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from elastocal.errors import InputError, suggest_names
+from elastocal.measuring.channels import MeasuringPlan, parse_measuring
+from elastocal.measuring.position import POSITION
 from elastocal.mechanics.chain import Chain
 from elastocal.mechanics.components import COMPONENT_NAMES, WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
@@ -22,6 +24,8 @@ NO_REMAINDER = "none"
 BEST_REMAINDER = "auto"
 UNKNOWN = "unknown"
 NO_ROTATION = (0.0, 0.0, 0.0)
+# Measuring plan of a campaign of positions.
+POSITIONS = MeasuringPlan((POSITION,))
 # Standard deviation of each coordinate of a declared offset that states none, m: a
 # caliper on a bracket, or a drawing of the tool.
 OFFSET_STD_M = 2e-4
@@ -84,6 +88,11 @@ class Measurements:
     row : (N,) int array, row in the file, 1 for the first row of data; for messages.
     u95_m : (N,) expanded uncertainty of the position, 95 % of one coordinate; None if
         the file does not state it.
+    channel : (N,) int array, index into the channels of the campaign's measuring plan;
+        None if it has none. If it has some, `position` (N, 1) or (N, 3) and
+        `rotation_vector` hold the numbers of the rows.
+    spread : (N,) standard deviation of each measurement over that of the campaign's
+        noise; None if they are alike.
     """
 
     session: np.ndarray
@@ -100,6 +109,8 @@ class Measurements:
     temperature_c: np.ndarray | None
     row: np.ndarray
     u95_m: np.ndarray | None = None
+    channel: np.ndarray | None = None
+    spread: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.pose)
@@ -133,7 +144,7 @@ class Campaign:
     name : name of the campaign.
     robot : nominal robot; its joints are rigid if `compliance` is nominal and the robot
         file states none.
-    measured : "position" or "pose".
+    measured : "position", or "pose" if a measurement has six numbers.
     frame : "base", or "tracker": the placement of the base is unknown, and different in
         each session.
     targets : tracked points of the robot.
@@ -149,6 +160,7 @@ class Campaign:
     remainder : residual model, a name in `residual_model.regressions`, "auto" or "none".
     table : name of the file of measurements; empty if there is none.
     header_line : line of the header if the file is text.
+    measuring : kinds, features and channels of the measurements.
     """
 
     name: str
@@ -166,6 +178,7 @@ class Campaign:
     base_std_m: float = 0.0
     table: str = ""
     header_line: int | None = None
+    measuring: MeasuringPlan = POSITIONS
 
     def locate_row(self, row: int) -> str:
         """Return where a row of the measurements is, by its line if the file is text."""
@@ -188,6 +201,7 @@ def assemble_campaign(
     measurements : the measurements.
     source : file of the document, for messages.
     """
+    plan = parse_measuring(document, source)
     compliance = document.get("compliance", "nominal")
     if compliance == "nominal" and not robot.compliance_known:
         # Without known compliances the joints are rigid, and masses have no effect.
@@ -195,12 +209,12 @@ def assemble_campaign(
     return Campaign(
         name=document["campaign"],
         robot=robot,
-        measured=document["measured"],
-        frame=document["frame"],
+        measured="pose" if plan.rows == 6 else "position",
+        frame="base" if document["frame"] == "base" else "tracker",
         targets=parse_targets(document["targets"], robot.chain, source),
         compliance=compliance,
         declared=tuple(document.get("declared", ())),
-        noise=document.get("noise"),
+        noise=complete_noise(document.get("noise"), plan),
         holdout=document.get("holdout", DEFAULT_HOLDOUT),
         measurements=measurements,
         remainder=document.get("remainder", BEST_REMAINDER),
@@ -210,7 +224,22 @@ def assemble_campaign(
         base_std_m=float(document.get("base_std_m", 0.0)),
         table=document.get("table", ""),
         header_line=document.get("header_line"),
+        measuring=plan,
     )
+
+
+def complete_noise(
+    noise: Mapping[str, Any] | None, plan: MeasuringPlan
+) -> dict[str, Any] | None:
+    """Complete declared noise: if positions have none, that of the first kind stands for
+    all, and the spread of the other kinds refers to it."""
+    if noise is None:
+        return None
+    by_kind = noise.get("by_kind", {})
+    first = plan.kinds[0].name
+    if "position_m" in noise or first not in by_kind:
+        return {**noise}
+    return {"position_m": by_kind[first], **noise}
 
 
 def parse_targets(
@@ -271,6 +300,8 @@ def _columns_by_field(joints: int) -> dict[str, Sequence[str]]:
         "time_s": ("time_s",),
         "temperature_c": ("temperature_c",),
         "u95_m": ("u95_m",),
+        "channel": ("channel",),
+        "spread": ("spread",),
     }
 
 
@@ -292,7 +323,12 @@ def tabulate_measurements(
         values = getattr(measurements, field)
         if values is None:
             values = np.full((count, len(names)), np.nan)
-        columns |= dict(zip(names, values.reshape(count, len(names)).T, strict=True))
+        values = values.reshape(count, -1)
+        if values.shape[1] < len(names):
+            # A measurement of one number has no further coordinates.
+            missing = len(names) - values.shape[1]
+            values = np.pad(values, ((0, 0), (0, missing)), constant_values=np.nan)
+        columns |= dict(zip(names, values.T, strict=True))
     return columns
 
 
@@ -308,6 +344,10 @@ def build_measurements(columns: Mapping[str, np.ndarray]) -> Measurements:
             values = np.column_stack([columns[name] for name in names])
         is_empty = values.dtype.kind == "f" and np.isnan(values).all()
         fields[field] = None if is_empty else values
+    if fields["channel"] is not None:
+        has_one_number = np.isnan(fields["position"][:, 1]).all()
+        fields["position"] = fields["position"][:, : 1 if has_one_number else 3]
+        fields["channel"] = fields["channel"].astype(int)
     return Measurements(**fields)
 
 

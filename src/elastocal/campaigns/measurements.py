@@ -35,6 +35,7 @@ CSV = "measurements.csv"
 PARQUET = "measurements.parquet"
 # Columns that a campaign can do without.
 CONDITIONS = ("time_s", "temperature_c", "u95_m")
+POSITION = ("x", "y", "z")
 ROTATION = ("rx", "ry", "rz")
 # A sheet for people has more columns. One is to be ticked and is not read.
 TICK_COLUMN = "done"
@@ -94,14 +95,14 @@ def find_files(folder: str | Path, *names: str) -> list[Path]:
     return paths
 
 
-def read_measurements(folder: Path, joints: int, measured: str) -> Cells:
+def read_measurements(folder: Path, joints: int, numbers: Sequence[str]) -> Cells:
     """Read the measurements of a campaign, with all columns that it needs.
 
     Parameters
     ----------
     folder : folder with either `CSV` or `PARQUET`.
     joints : number of joints of the robot.
-    measured : "position" or "pose".
+    numbers : columns with what was measured, such as `POSITION`.
 
     Raises
     ------
@@ -120,21 +121,19 @@ def read_measurements(folder: Path, joints: int, measured: str) -> Cells:
     if len(table.rows) == 0:
         allowed = "one row for each measurement of one target"
         raise InputError(paths[0], "", "no row of data", allowed)
-    _check_required_columns(table, joints, measured)
+    _check_required_columns(table, joints, numbers)
     _check_displayed_angles(table, joints)
     return table
 
 
-def _check_required_columns(table: Cells, joints: int, measured: str) -> None:
+def _check_required_columns(table: Cells, joints: int, measured: Sequence[str]) -> None:
     """Refuse a table that lacks a column, or some of the columns of wrench or approach."""
     present = table.columns.keys()
     numbers = range(1, joints + 1)
     approach = [f"approach{joint}" for joint in numbers]
     required = ["pose", "load", "repeat", "target"]
     required += [f"q{joint}" for joint in numbers]
-    required += ["x", "y", "z"]
-    if measured == "pose":
-        required += ROTATION
+    required += measured
     for optional in (WRENCH_NAMES, approach):
         if present & {*optional}:
             required += optional

@@ -17,6 +17,7 @@ from elastocal.campaigns.campaign import (
     Measurements,
     Target,
     assemble_campaign,
+    complete_noise,
     group_equal_rows,
     parse_targets,
 )
@@ -29,12 +30,13 @@ from elastocal.campaigns.holdout import (
 )
 from elastocal.campaigns.measurements import (
     LARGEST_ROTATION_RAD,
-    ROTATION,
     read_measurements,
 )
+from elastocal.campaigns.numbers import list_required_columns, read_numbers
 from elastocal.campaigns.tables import Cells
 from elastocal.counting import format_count
 from elastocal.errors import InputError, suggest_names
+from elastocal.measuring.channels import MeasuringPlan, parse_measuring
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import parse_robot
@@ -79,7 +81,8 @@ def read_campaign(
     _ = folder.held_out_path
     if effects is not None:
         check_declared(document, effects, folder.source)
-    table = read_measurements(folder.path, robot.joints, document["measured"])
+    plan = parse_measuring(document, folder.source)
+    table = read_measurements(folder.path, robot.joints, list_required_columns(plan))
     file = {"table": Path(table.path).name, "header_line": table.header_line}
     return build_campaign(document | file, robot, table, folder.source)
 
@@ -102,16 +105,22 @@ def build_campaign(
     InputError
         As `read_campaign`.
     """
-    measured = document["measured"]
+    plan = parse_measuring(document, source)
+    noise = complete_noise(document.get("noise"), plan)
     targets = parse_targets(document["targets"], robot.chain, source)
-    measurements = _build_measurements(table, robot, targets, measured)
-    _check_measurements(measurements, table, robot, targets)
+    measurements = _build_measurements(table, robot, targets)
+    _check_states(measurements, table, robot)
+    measurements = read_numbers(measurements, table, plan, noise)
+    _refuse_duplicates(measurements, table, targets)
+    if not plan.channels:
+        _check_poses(measurements, table, robot, targets)
+    _check_features_measured(measurements, plan, source)
     _check_targets_measured(measurements, table, targets, source)
     _check_compliance(document, robot, measurements, source)
     if "base_std_m" in document and document["frame"] != "base":
         allowed = "frame: base; an unknown placement of the base has no prior"
         raise InputError(source, "base_std_m", f"frame: {document['frame']}", allowed)
-    _check_noise(document.get("noise"), measurements, robot, source)
+    _check_noise(noise, measurements, robot, source)
     holdout = document.get("holdout", DEFAULT_HOLDOUT)
     select_held_out(holdout, measurements, robot.reported_offset, source)
     return assemble_campaign(document, robot, measurements, source)
@@ -227,10 +236,10 @@ def _check_noise(
 
 
 def _build_measurements(
-    table: Cells, robot: Robot, targets: Sequence[Target], measured: str
+    table: Cells, robot: Robot, targets: Sequence[Target]
 ) -> Measurements:
-    """Return the measurements of a table; angles in degrees and unknown targets are
-    refused."""
+    """Return the measurements of a table, still without the numbers that were measured;
+    angles in degrees and unknown targets are refused."""
     reported = table.matrix(_joint_columns("q", robot))
     _refuse_degrees(reported, table, robot)
     count = len(table.rows)
@@ -248,8 +257,8 @@ def _build_measurements(
         target=_target_indices(table, targets),
         joint_angles=robot.model_angles(reported),
         wrench=table.matrix(WRENCH_NAMES) if has_wrench else np.zeros((count, 6)),
-        position=table.matrix("xyz"),
-        rotation_vector=table.matrix(ROTATION) if measured == "pose" else None,
+        position=np.zeros((count, 3)),
+        rotation_vector=None,
         approach=_approach_directions(table, robot),
         time_s=optional("time_s"),
         temperature_c=optional("temperature_c"),
@@ -300,16 +309,18 @@ def _approach_directions(table: Cells, robot: Robot) -> np.ndarray | None:
     return np.sign(approach @ robot.reported_matrix.T)
 
 
-def _check_measurements(
-    measurements: Measurements, table: Cells, robot: Robot, targets: Sequence[Target]
-) -> None:
-    """Refuse measurements that cannot belong to one campaign or are in other units than
-    those of the format."""
-    _refuse_duplicates(measurements, table, targets)
+def _check_states(measurements: Measurements, table: Cells, robot: Robot) -> None:
+    """Refuse states of the robot that cannot belong to one campaign."""
     _refuse_undeclared_loads(measurements, table)
     _refuse_poses_of_different_angles(measurements, table, robot)
-    _refuse_millimetres(measurements, table, robot, targets)
     _refuse_clocks_set_back(measurements, table)
+
+
+def _check_poses(
+    measurements: Measurements, table: Cells, robot: Robot, targets: Sequence[Target]
+) -> None:
+    """Refuse positions and orientations in other units than those of the format."""
+    _refuse_millimetres(measurements, table, robot, targets)
     if measurements.rotation_vector is not None:
         _refuse_large_rotations(measurements.rotation_vector, table)
 
@@ -319,21 +330,30 @@ def _refuse_duplicates(
 ) -> None:
     """Refuse a second measurement of the same session, pose, load, repeat and
     target."""
-    names = ("session", "pose", "load", "repeat", "target")
-    keys = np.column_stack([getattr(measurements, name) for name in names])
+    names = ["session", "pose", "load", "repeat", "target"]
+    columns = [getattr(measurements, name) for name in names]
+    if measurements.channel is not None:
+        # The target is the last key that a message names.
+        columns.insert(0, measurements.channel)
+        names.insert(0, "channel")
+    keys = np.column_stack(columns)
     first, group = group_equal_rows(keys)
     duplicate = first[group] != np.arange(len(measurements))
     if not duplicate.any():
         return
-    row = int(np.argmax(duplicate))
+    index = int(np.argmax(duplicate))
     numbers = [
         f"{name} {value}"
-        for name, value in zip(names[:-1], keys[row, :-1], strict=True)
+        for name, value in zip(names[:-1], keys[index, :-1], strict=True)
         if name in table.columns
     ]
-    target = targets[keys[row, -1]].name
+    target = targets[keys[index, -1]].name
     finding = f"{', '.join(numbers)}, target {target} again"
-    allowed = f"each once (first in {table.locate(first[group[row]])})"
+    # A row with several measurements has one place in the table.
+    row, earlier = np.searchsorted(
+        table.rows, measurements.row[[index, first[group[index]]]]
+    ).tolist()
+    allowed = f"each once (first in {table.locate(earlier)})"
     raise table.fault(row, "", allowed, finding)
 
 
@@ -451,3 +471,16 @@ def _check_targets_measured(
             allowed = f"targets that {Path(table.path).name} has measurements of"
             key = f"targets.{target.name}"
             raise InputError(source, key, "no measurement of it", allowed)
+
+
+def _check_features_measured(
+    measurements: Measurements, plan: MeasuringPlan, source: str
+) -> None:
+    """Refuse a feature that no row refers to."""
+    if measurements.channel is None:
+        return
+    for index, channel in enumerate(plan.channels):
+        if channel.feature is not None and not (measurements.channel == index).any():
+            name = plan.features[channel.feature].name
+            allowed = "features that the measurements have rows of"
+            raise InputError(source, f"features.{name}", "no row of it", allowed)

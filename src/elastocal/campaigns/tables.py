@@ -10,7 +10,7 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -139,6 +139,11 @@ class Cells:
     header_line: int | None = None
     headers: Mapping[str, str] = field(default_factory=dict)
     scales: Mapping[str, float] = field(default_factory=dict)
+
+    def select(self, chosen: np.ndarray) -> "Cells":
+        """Select rows, given as an index array."""
+        columns = {name: column.take(chosen) for name, column in self.columns.items()}
+        return replace(self, columns=columns, rows=self.rows[chosen])
 
     def fault(
         self, index: int, name: str, allowed: str, finding: str | None = None

@@ -115,6 +115,9 @@ _OPTIONAL_COLUMNS = (
     "rx",
     "ry",
     "rz",
+    "kind",
+    "feature",
+    "value",
 )
 
 

@@ -138,8 +138,11 @@ LOAD_UNITS = (
 def find_faults(campaign: Campaign) -> tuple[Fault, ...]:
     """Find the faults that the measurements of a campaign show.
 
-    A check is skipped if a fault that was already found makes it meaningless.
+    A check is skipped if a fault that was already found makes it meaningless. All of
+    them compare positions, which campaigns with features do not have.
     """
+    if campaign.measuring.channels:
+        return ()
     for find in (find_constant_columns, find_better_interpretation):
         faults = find(campaign)
         if faults:
@@ -438,6 +441,8 @@ def warn_of_compliances(fitted: Fit) -> list[str]:
 
 def warn_of_computed_positions(campaign: Campaign) -> list[str]:
     """Warn of positions that a controller computed by the kinematics of the robot file."""
+    if campaign.measuring.channels:
+        return []
     rms_m = root_mean_square(place_measurements(campaign).distance)
     if rms_m > _MIN_ROBOT_ERROR_M:
         return []

@@ -75,6 +75,8 @@ def compare_target_distances(campaign: Campaign) -> list[str]:
 
     Only targets on one measuring point are compared, because no joint lies between.
     """
+    if campaign.measuring.channels:
+        return []
     deviations = [
         deviation
         for deviation in _measure_deviations(campaign)

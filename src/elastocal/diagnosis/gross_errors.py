@@ -340,6 +340,20 @@ def format_gross_error_warnings(gross_errors: list[GrossError]) -> list[str]:
     return sentences
 
 
+def _find_cause(campaign: Campaign, index: int) -> str:
+    """The cause of a wrong position, if it shows: a lost or a held point."""
+    measurements = campaign.measurements
+    position = measurements.position
+    same_position = (position == position[index]).all(axis=1)
+    same_position[index] = False
+    if not position[index].any():
+        return ", reads 0, 0, 0"
+    if same_position.any():
+        first = int(measurements.row[np.argmax(same_position)])
+        return f", the same point as {campaign.locate_row(first)}"
+    return ""
+
+
 def _format_gross_error(outcome: OutlierTest, campaign: Campaign, index: int) -> str:
     """A sentence with the line of a row in its file, the size of its residual, the
     cause if it shows, and how probable it is that the row is wrong, if that is less
@@ -353,15 +367,9 @@ def _format_gross_error(outcome: OutlierTest, campaign: Campaign, index: int) ->
         size = f"{1e-3 * distance_mm:.3g} m"
     if len(residual) > 3:
         size += f" and {1e3 * np.linalg.norm(residual[3:]):.3g} mrad"
-    position = measurements.position
-    same_position = (position == position[index]).all(axis=1)
-    same_position[index] = False
     cause = ""
-    if not position[index].any():
-        cause = ", reads 0, 0, 0"
-    elif same_position.any():
-        first = int(measurements.row[np.argmax(same_position)])
-        cause = f", the same point as {campaign.locate_row(first)}"
+    if measurements.channel is None:
+        cause = _find_cause(campaign, index)
     probability = outcome.probability[index]
     uncertainty = ""
     if probability < _OVERWHELMING:

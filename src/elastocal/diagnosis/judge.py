@@ -24,6 +24,7 @@ from elastocal.fitting.model import (
     Case,
     compute_residuals,
     evaluate_conditions,
+    predict,
     transform_to_base,
 )
 from elastocal.fitting.noise import get_noise
@@ -229,10 +230,13 @@ def apply_regression(
     Returns
     -------
     CorrectedResiduals or None
-        None if the campaign asks for no regression, or if its data are at fault.
+        None if the campaign asks for no regression, if its data are at fault, or if its
+        measurements have no vectors that a regression could predict.
     """
     campaign = diagnosis.case.campaign
     if campaign.remainder == NO_REMAINDER or diagnosis.verdict.faults:
+        return None
+    if diagnosis.final.model.rows == 1:
         return None
     # Poses that were held out at random have neighbours among the fitted ones. Others
     # have none, and the poses that set the intervals must not have any either.
@@ -500,10 +504,17 @@ def _tabulate_stages(
     for stage, (model, estimate) in stages.items():
         conditions = evaluate_conditions(model, estimate, observations.states)
         residuals[stage] = compute_residuals(model, estimate, observations, conditions)
+    model, estimate = stages["after"]
+    if model.measuring is None:
+        position, _ = transform_to_base(estimate, observations)
+    else:
+        # Readings of other kinds are no positions, so state where the target was.
+        conditions = evaluate_conditions(model, estimate, observations.states)
+        position, _ = predict(model, estimate, observations, conditions)
     return tabulate_residuals(
         measurements,
         outside,
-        transform_to_base(stages["after"][1], observations)[0],
+        position,
         residuals,
         held_out=held_out,
         gross_errors=gross_errors,

@@ -97,6 +97,36 @@ def draw_candidate_experiments(
     return angles, states.wrench[chosen] * (largest / force[chosen])[:, None]
 
 
+def draw_measured_experiments(
+    observations: Observations, count: int, stream: np.random.Generator
+) -> Observations:
+    """Draw experiments that measure an observation of the campaign again.
+
+    At other joint angles the robot would not touch the features of the campaign.
+
+    Returns
+    -------
+    Observations, each of a pose of its own
+    """
+    chosen = stream.integers(0, len(observations), count)
+    states = observations.states.select(observations.state[chosen])
+    states = replace(states, pose=np.arange(count), repeats=np.ones(count, int))
+    return replace(
+        observations,
+        states=states,
+        state=np.arange(count),
+        target=observations.target[chosen],
+        position=observations.position[chosen],
+        rotation=_select(observations.rotation, chosen),
+        channel=_select(observations.channel, chosen),
+        spread=_select(observations.spread, chosen),
+    )
+
+
+def _select(values: np.ndarray | None, chosen: np.ndarray) -> np.ndarray | None:
+    return None if values is None else values[chosen]
+
+
 def build_planned_observations(
     model: FittedModel, states: States, angles: np.ndarray, wrench: np.ndarray
 ) -> Observations:
@@ -358,11 +388,18 @@ def propose_experiment(
         return _explain_no_experiment(robot, best, reason)
     hypotheses = _select_hypotheses(evidence)
     model = diagnosis.final.model
-    states = diagnosis.case.observations.states
-    angles, wrench = draw_candidate_experiments(
-        states, robot, _CANDIDATE_EXPERIMENTS, stream
-    )
-    planned = build_planned_observations(model, states, angles, wrench)
+    observations = diagnosis.case.observations
+    if model.measuring is None:
+        angles, wrench = draw_candidate_experiments(
+            observations.states, robot, _CANDIDATE_EXPERIMENTS, stream
+        )
+        planned = build_planned_observations(model, observations.states, angles, wrench)
+    else:
+        planned = draw_measured_experiments(
+            observations, _CANDIDATE_EXPERIMENTS, stream
+        )
+        angles = planned.states.joint_angles
+        wrench = planned.states.wrench
     pairs, rows = _predict_experiments(evidence, hypotheses, planned)
     plan = _Plan.choose(hypotheses, pairs, rows, poses)
     if plan.unreachable and plan.certainty >= evidence.design.settings.credible:

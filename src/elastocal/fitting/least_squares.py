@@ -34,6 +34,7 @@ from elastocal.fitting.normal_equations import (
     solve_normal_equations,
 )
 from elastocal.fitting.observations import sample_observations, split_into_blocks
+from elastocal.measuring.catalogue import list_kinds
 from elastocal.mechanics.kinematics import compute_point_poses
 
 if TYPE_CHECKING:
@@ -798,9 +799,140 @@ def register_placement(model: Model, observations: Observations) -> Estimate:
     .. [2] Markley et al., J. Guidance 30, 2007.
     """
     observations = sample_observations(observations, START_SAMPLE_SIZE)
-    return register_to_poses(
-        model, observations, *compute_nominal_poses(model, observations)
+    nominal = compute_nominal_poses(model, observations)
+    if model.measuring is not None:
+        return start_features(model, observations, *nominal)
+    return register_to_poses(model, observations, *nominal)
+
+
+def start_features(
+    model: Model,
+    observations: Observations,
+    nominal_position: np.ndarray,
+    nominal_rotation: np.ndarray,
+) -> Estimate:
+    """Find frames, targets and features from which a fit converges.
+
+    Frames and targets come from the rows whose positions in the frame of the session are
+    known: poses of targets, and features whose places are stated. A feature starts from
+    the nominal positions of its targets.
+
+    Parameters
+    ----------
+    model : Model with a measuring plan
+    observations : M observations
+    nominal_position, nominal_rotation : (M, 3) and (M, 3, 3) arrays, base axes
+    """
+    plan = model.measuring
+    assert plan is not None
+    assert observations.channel is not None
+    sessions = np.unique(observations.states.session)
+    known, position = _find_known_positions(model, observations)
+    if known.any():
+        located = replace(
+            observations, position=position, channel=None, spread=None, rotation=None
+        )
+        estimate = _register_known(
+            replace(model, rows=3, measuring=None),
+            located,
+            (nominal_position, nominal_rotation),
+            known,
+        )
+    else:
+        estimate = _place_at_base(model, sessions)
+    session = np.searchsorted(
+        estimate.sessions, observations.states.session[observations.state]
     )
+    targets = nominal_position + np.einsum(
+        "mij,mj->mi", nominal_rotation, estimate.target_offset[observations.target]
+    )
+    frame = estimate.frame_rotation[session]
+    in_session = (frame @ targets[..., None])[..., 0] + estimate.frame_position[session]
+    feature_of_channel = np.array(
+        [-1 if entry.feature is None else entry.feature for entry in plan.channels]
+    )
+    features = []
+    for index, feature in enumerate(plan.features):
+        members = feature_of_channel[observations.channel] == index
+        start = list_kinds()[feature.kind].start
+        numbers = observations.position[members]
+        features.append(start(feature, in_session[members], numbers))
+    return replace(
+        estimate.with_effects(model.effects),
+        coefficients=model.nominal_coefficients,
+        features=tuple(features),
+    )
+
+
+def _place_at_base(model: Model, sessions: np.ndarray) -> Estimate:
+    """Estimate with all sessions in base axes and targets where they are declared, or on
+    their measuring points."""
+    count = len(sessions)
+    rotations = [target.rotation or NO_ROTATION for target in model.targets]
+    offsets = [target.offset_m or (0.0, 0.0, 0.0) for target in model.targets]
+    return Estimate(
+        tuple(sessions.tolist()),
+        np.tile(np.eye(3), (count, 1, 1)),
+        np.zeros((count, 3)),
+        np.array(offsets, float),
+        Rotation.from_rotvec(rotations).as_matrix(),
+    )
+
+
+def _register_known(
+    model: Model,
+    located: Observations,
+    nominal: tuple[np.ndarray, np.ndarray],
+    known: np.ndarray,
+) -> Estimate:
+    """Register sessions by their observations with known positions (M,); others stay in
+    base axes."""
+    sessions = np.unique(located.states.session)
+    start = _place_at_base(model, sessions)
+    subset = replace(
+        located,
+        state=located.state[known],
+        target=located.target[known],
+        position=located.position[known],
+    )
+    registered = register_to_poses(
+        replace(model, effects=()), subset, nominal[0][known], nominal[1][known]
+    )
+    has_known = np.isin(sessions, located.states.session[located.state[known]])
+    return replace(
+        start,
+        frame_rotation=np.where(
+            has_known[:, None, None], registered.frame_rotation, start.frame_rotation
+        ),
+        frame_position=np.where(
+            has_known[:, None], registered.frame_position, start.frame_position
+        ),
+        target_offset=registered.target_offset,
+    )
+
+
+def _find_known_positions(
+    model: Model, observations: Observations
+) -> tuple[np.ndarray, np.ndarray]:
+    """Find the observations (M,) whose target has a known position in the session, and
+    these positions (M, 3), m."""
+    plan = model.measuring
+    assert plan is not None
+    assert observations.channel is not None
+    known = np.zeros(len(observations), bool)
+    position = np.zeros((len(observations), 3))
+    for number, channel in enumerate(plan.channels):
+        members = observations.channel == number
+        if channel.feature is not None:
+            feature = plan.features[channel.feature]
+            place = channel.kind.locate(feature)
+            if place is not None and channel.component in (None, 0):
+                known |= members
+                position[members] = place
+        elif channel.component is None:
+            known |= members
+            position[members] = observations.position[members]
+    return known, position
 
 
 def compute_nominal_poses(

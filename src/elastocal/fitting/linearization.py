@@ -26,6 +26,7 @@ from elastocal.effects.conditions import (
     replace_springs,
     replace_total_load,
 )
+from elastocal.fitting.features import evaluate_channels
 from elastocal.fitting.model import (
     LOAD_EFFECTS,
     compute_displaced_coordinates,
@@ -33,6 +34,7 @@ from elastocal.fitting.model import (
     get_joint_compliances,
     get_mass_corrections,
     locate_targets,
+    place_in_session,
     subtract_prediction,
     sum_displacements,
     update_springs_and_masses,
@@ -257,8 +259,9 @@ class LinearModel:
     residual : (M, rows) array
         Measured minus predicted, base axes, m and rad.
     columns : FactoredSensitivities
-        With respect to the P parameters. The components of fitted targets are
-        additional coordinates, each of which moves one target.
+        With respect to the P parameters. The components of fitted targets and the
+        unknowns of features are additional coordinates, each of which moves one target
+        or one feature.
     coordinates : (S, C) array, displaced coordinates of the sites
     conditions : Conditions, at the displaced pose of this estimate
     """
@@ -332,8 +335,13 @@ def linearize_coordinates(
     rotation = np.empty((count, 3, 3))
     # The component comes first, so that the arithmetic of effects is contiguous along
     # the observations.
-    coordinate_count = sites.chain.coordinates + _count_target_coordinates(model)
-    jacobian = np.zeros((model.rows, coordinate_count, count))
+    jacobian = np.zeros(
+        (
+            6 if model.has_orientations else 3,
+            sites.chain.coordinates + _count_target_coordinates(model),
+            count,
+        )
+    )
     for index, point in enumerate(points):
         members = np.flatnonzero(observations.target == index)
         state = observations.state[members]
@@ -345,21 +353,50 @@ def linearize_coordinates(
         position[members] = point_position.T
         rotation[members] = np.moveaxis(moved.rotation[followed][..., state], -1, 0)
         jacobian[:, : sites.chain.coordinates, members] = moved.jacobian(
-            point.after, point_position, model.rows, state
+            point.after, point_position, len(jacobian), state
         )
     _fill_target_jacobian(
         jacobian[:, sites.chain.coordinates :], model, observations, rotation
     )
     rotation = rotation @ estimate.target_rotation[observations.target]
-    columns = FactoredSensitivities.of(
-        [], np.moveaxis(jacobian, -1, 0), observations.state, len(coordinates)
+    residual, jacobian = _read_targets(
+        model,
+        estimate,
+        observations,
+        (position, rotation),
+        np.moveaxis(jacobian, -1, 0),
     )
     return LinearModel(
-        subtract_prediction(estimate, observations, position, rotation),
-        columns,
+        residual,
+        FactoredSensitivities.of([], jacobian, observations.state, len(coordinates)),
         coordinates,
         replace_motion(conditions, moved),
     )
+
+
+def _read_targets(
+    model: Model,
+    estimate: Estimate,
+    observations: Observations,
+    predicted: tuple[np.ndarray, np.ndarray],
+    jacobian: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Residual (M, rows), and Jacobian (M, rows, C) of what is read of the targets.
+
+    `predicted` are poses (M, 3), (M, 3, 3) in base axes, `jacobian` (M, 3 or 6, C) is
+    that of these poses. Fitted unknowns of features are additional coordinates.
+    """
+    if model.measuring is None:
+        residual = subtract_prediction(model, estimate, observations, *predicted)
+        return residual, jacobian
+    channels = evaluate_channels(
+        model.measuring,
+        observations,
+        place_in_session(estimate, observations, *predicted),
+        estimate.features,
+    )
+    by_pose = channels.by_pose[..., : jacobian.shape[1]] @ jacobian
+    return channels.residual, np.concatenate([by_pose, channels.by_unknowns], axis=2)
 
 
 def _count_target_coordinates(model: Model) -> int:

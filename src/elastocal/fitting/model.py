@@ -27,6 +27,14 @@ from elastocal.effects.gravity import (
     declared_weight,
 )
 from elastocal.effects.protocol import Candidate, Parameter, moved_and_turned
+from elastocal.fitting.features import (
+    SessionPoses,
+    evaluate_channels,
+    get_feature_deviations,
+    list_feature_parameters,
+    list_fitted_features,
+    move_features,
+)
 from elastocal.fitting.observations import (
     Observations,
     average_repeats,
@@ -47,6 +55,7 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Target
     from elastocal.effects.conditions import Conditions
     from elastocal.fitting.observations import States
+    from elastocal.measuring.channels import MeasuringPlan
     from elastocal.mechanics.chain import MeasuringPoint
 
 # Plausible sizes of frames and targets, which may be anywhere in a workshop.
@@ -77,7 +86,8 @@ class Model:
     fitted_frames : bool
         Whether the placement of the base is unknown, one for each session.
     rows : int
-        3 if positions are measured, 6 if poses are.
+        Numbers in a measurement: 3 if positions are measured, 6 if poses are; 1 if
+        each number is a measurement of its own.
     nominal_compliance : (n,) array, rad/(N m)
     effects : tuple of Candidate
         Including joint compliances, if they are identified, and errors of declared
@@ -93,6 +103,9 @@ class Model:
     base_std_m : float
         Standard deviation of each coordinate of a declared base in each session, which
         is fitted with this prior; 0 if the base is exact or unknown.
+    measuring : MeasuringPlan or None
+        Kinds, features and channels of the campaign; None if every measurement is the
+        position or pose of a target.
     """
 
     sites: Sites
@@ -105,6 +118,14 @@ class Model:
     row_span: tuple[int, int] | None = None
     compliance_known: bool = True
     base_std_m: float = 0.0
+    measuring: MeasuringPlan | None = None
+
+    @property
+    def has_orientations(self) -> bool:
+        """Whether orientations are measured."""
+        if self.measuring is None:
+            return self.rows == 6
+        return self.measuring.has_orientations
 
     @property
     def has_frame_parameters(self) -> bool:
@@ -135,7 +156,7 @@ class Model:
         for index, target in enumerate(self.targets):
             is_exact = target.offset_m is not None and not target.has_inexact_offset
             first = 3 if is_exact else 0
-            last = self.rows if target.rotation is None else 3
+            last = 6 if self.has_orientations and target.rotation is None else 3
             if first < last:
                 components.append((index, slice(first, last)))
         return components
@@ -145,7 +166,8 @@ class Model:
         """Whether any target has no declared offset, or no declared rotation although
         rotations are measured."""
         return any(
-            target.offset_m is None or (self.rows == 6 and target.rotation is None)
+            target.offset_m is None
+            or (self.has_orientations and target.rotation is None)
             for target in self.targets
         )
 
@@ -172,6 +194,7 @@ class Estimate:
         Each target in the frame of its measuring point, m.
     coefficients : tuple of arrays, linear parameters of each effect
     shapes : tuple of arrays, shape parameters of each effect
+    features : tuple of arrays, values of each feature of the measuring plan
     """
 
     sessions: tuple[int, ...]
@@ -181,6 +204,7 @@ class Estimate:
     target_rotation: np.ndarray
     coefficients: tuple[np.ndarray, ...] = ()
     shapes: tuple[np.ndarray, ...] = ()
+    features: tuple[np.ndarray, ...] = ()
 
     def with_effects(self, effects: Sequence[Candidate]) -> Estimate:
         """Add effects, all of them at zero."""
@@ -227,13 +251,14 @@ def build_declared_model(
         sites,
         campaign.targets,
         campaign.frame == "tracker",
-        6 if campaign.measured == "pose" else 3,
+        campaign.measuring.rows,
         campaign.robot.compliance,
         (*own_effects, *effects),
         0.0 if time_s is None else float(time_s.min()),
         row_span,
         campaign.robot.compliance_known,
         campaign.base_std_m,
+        campaign.measuring if campaign.measuring.channels else None,
     )
 
 
@@ -285,6 +310,7 @@ def list_parameters(model: Model, estimate: Estimate) -> list[tuple[str, Paramet
                     prior_std=target.offset_std_m,
                 )
             parameters.append((owner, component))
+    parameters += list_feature_parameters(model.measuring)
     for effect in model.effects:
         parameters += [(effect.key, parameter) for parameter in effect.parameters]
         for shape in effect.shapes:
@@ -305,8 +331,9 @@ def _describe_frame(model: Model) -> tuple[Parameter, ...]:
 
 
 def find_placement_parameters(owners: Iterable[str]) -> np.ndarray:
-    """Find the owners that are frames and targets, bool array."""
-    return np.array([owner.startswith(("frame ", "target ")) for owner in owners], bool)
+    """Find the owners that are frames, targets and features, bool array."""
+    prefixes = ("frame ", "target ", "feature ")
+    return np.array([owner.startswith(prefixes) for owner in owners], bool)
 
 
 def get_parameter_bounds(model: Model, estimate: Estimate) -> np.ndarray:
@@ -353,6 +380,7 @@ def get_parameter_values(model: Model, estimate: Estimate) -> np.ndarray:
         if target.has_inexact_offset:
             deviation[:3] = estimate.target_offset[index] - target.offset_m
         values.append(deviation[fitted])
+    values += get_feature_deviations(model.measuring, estimate.features)
     for coefficients, shapes in zip(
         estimate.coefficients, estimate.shapes, strict=True
     ):
@@ -403,6 +431,7 @@ def _move_placement(
         frame_position=frame_position,
         target_offset=target_offset,
         target_rotation=target_rotation,
+        features=move_features(model.measuring, estimate.features, components),
     )
 
 
@@ -412,6 +441,7 @@ def _group_sizes(model: Model, estimate: Estimate) -> list[int]:
     sizes = [6] * len(estimate.sessions) if model.has_frame_parameters else []
     for _, fitted in model.fitted_target_components:
         sizes.append(fitted.stop - fitted.start)
+    sizes += [len(entry.numbers) for entry in list_fitted_features(model.measuring)]
     for effect in model.effects:
         sizes += [len(effect.parameters), len(effect.shapes)]
     return sizes
@@ -580,14 +610,15 @@ def compute_residuals(
 ) -> np.ndarray:
     """Compute measured minus predicted values, (M, rows) array, base axes.
 
-    Positions in m and, if poses are measured, rotation vectors in rad. Arguments are
-    those of `predict`.
+    Positions in m and, if poses are measured, rotation vectors in rad; single numbers
+    of other kinds. Arguments are those of `predict`.
     """
     position, rotation = predict(model, estimate, observations, conditions)
-    return subtract_prediction(estimate, observations, position, rotation)
+    return subtract_prediction(model, estimate, observations, position, rotation)
 
 
 def subtract_prediction(
+    model: Model,
     estimate: Estimate,
     observations: Observations,
     position: np.ndarray,
@@ -595,10 +626,32 @@ def subtract_prediction(
 ) -> np.ndarray:
     """Subtract predicted poses (M, 3), (M, 3, 3) from measured ones; see
     `compute_residuals`."""
+    if model.measuring is not None:
+        poses = place_in_session(estimate, observations, position, rotation)
+        return evaluate_channels(
+            model.measuring, observations, poses, estimate.features
+        ).residual
     measured, measured_rotation = transform_to_base(estimate, observations)
     if measured_rotation is None:
         return measured - position
     return compute_pose_differences(measured, measured_rotation, position, rotation)
+
+
+def place_in_session(
+    estimate: Estimate,
+    observations: Observations,
+    position: np.ndarray,
+    rotation: np.ndarray,
+) -> SessionPoses:
+    """Transform predicted poses (M, 3), (M, 3, 3) from base axes into the frames of the
+    sessions of the observations."""
+    session = np.searchsorted(
+        estimate.sessions, observations.states.session[observations.state]
+    )
+    frame = estimate.frame_rotation[session]
+    in_session = (frame @ position[..., None])[..., 0]
+    in_session += estimate.frame_position[session]
+    return SessionPoses(in_session, frame @ rotation, frame)
 
 
 def transform_to_base(

@@ -182,13 +182,18 @@ def choose_noise(
     if repeats is None or declared is None:
         return repeats or declared, []
     ratio = repeats.position_m / declared.position_m
-    freedom = repeats.degrees_of_freedom * 3 // model.rows
+    freedom = repeats.degrees_of_freedom // count_sensors(model.rows)
     low, high = np.sqrt(2 * gammaincinv(freedom / 2, _RATIO_QUANTILES) / freedom)
     if low < ratio < high:
         return repeats, []
     return repeats, [
         f"repeats show {ratio:.2f} times the declared noise of positions; the repeats are used"
     ]
+
+
+def count_sensors(rows: int) -> int:
+    """Count the sensor parts of a measurement: positions or numbers, and orientations."""
+    return 2 if rows == 6 else 1
 
 
 def _read_declared_noise(campaign: Campaign) -> Noise | None:
@@ -201,7 +206,7 @@ def _read_declared_noise(campaign: Campaign) -> Noise | None:
     u95_m = campaign.measurements.u95_m
     if u95_m is not None:
         position_m = float(np.sqrt((u95_m**2).mean())) / _COVERAGE_FACTOR
-    elif declared:
+    elif "position_m" in declared:
         position_m = declared["position_m"]
     else:
         return None
@@ -421,18 +426,30 @@ def _compute_contrasts(
     nominal = replace(estimate, coefficients=(), shapes=())
     conditions = evaluate_conditions(nominal_model, nominal, observations.states)
     linear_model = linearize(nominal_model, nominal, observations, conditions)
+    if observations.spread is not None:
+        linear_model = _standardize(linear_model, observations.spread)
     stacks = [
         _contrast_repeats(linear_model, members)
         for members in _stack_repeats(observations, averaged_state)
     ]
     contrasts = _Contrasts(
         sum(stack.count for stack in stacks),
-        sum((stack.squares for stack in stacks), np.zeros(model.rows // 3)),
+        sum((stack.squares for stack in stacks), np.zeros(count_sensors(model.rows))),
         np.concatenate([stack.projections for stack in stacks]),
         np.concatenate([stack.gram for stack in stacks]),
     )
     total = contrasts.count * len(contrasts.squares)
     return contrasts if total >= MIN_CONTRASTS else None
+
+
+def _standardize(linear_model: LinearModel, spread: np.ndarray) -> LinearModel:
+    """Divide residuals and Jacobians by the spread (M,) of the observations."""
+    columns = linear_model.columns
+    return replace(
+        linear_model,
+        residual=linear_model.residual / spread[:, None],
+        columns=replace(columns, jacobian=columns.jacobian / spread[:, None, None]),
+    )
 
 
 def _select_comparable_approaches(
@@ -480,10 +497,11 @@ def _contrast_repeats(linear_model: LinearModel, members: np.ndarray) -> _Contra
     groups, repeats, targets = members.shape
     residual = linear_model.residual[members].reshape(groups, repeats, -1)
     vectors = helmert(repeats) @ residual
-    vectors = vectors.reshape(groups, repeats - 1, targets, -1, 3)
-    sensors = vectors.shape[3]
+    rows = linear_model.residual.shape[1]
+    sensors = count_sensors(rows)
+    vectors = vectors.reshape(groups, repeats - 1, targets, sensors, -1)
     jacobian = linear_model.joint_jacobian[members[:, 0]].reshape(
-        groups, targets, sensors, 3, -1
+        groups, targets, sensors, rows // sensors, -1
     )
     projections = np.einsum("gtsxn,grtsx->grsn", jacobian, vectors)
     gram = np.einsum("gtsxn,gtsxm->gsnm", jacobian, jacobian)

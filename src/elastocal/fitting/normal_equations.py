@@ -249,7 +249,10 @@ class Whitening:
 
 
 def compute_measurement_covariances(
-    noise: Noise, jacobians: np.ndarray, rows: int
+    noise: Noise,
+    jacobians: np.ndarray,
+    rows: int,
+    spread: np.ndarray | None = None,
 ) -> np.ndarray:
     """Compute the covariance of all measurements of one approach.
 
@@ -259,7 +262,9 @@ def compute_measurement_covariances(
     jacobians : (G, k, rows, n) array
         Jacobians of k targets with respect to the joints.
     rows : int
-        3 for positions, 6 for poses.
+        3 for positions, 6 for poses, 1 for single numbers.
+    spread : (G, k) array, optional
+        Standard deviation of each measurement over that of the noise.
 
     Returns
     -------
@@ -270,7 +275,10 @@ def compute_measurement_covariances(
     stacked = jacobians.reshape(groups, size, -1) * noise.joint_rad
     covariance = stacked @ stacked.transpose(0, 2, 1)
     diagonal = np.arange(size)
-    covariance[:, diagonal, diagonal] += np.tile(noise.sensor_std(rows) ** 2, targets)
+    sensor_variance = np.tile(noise.sensor_std(rows) ** 2, targets)
+    if spread is not None:
+        sensor_variance = sensor_variance * np.repeat(spread**2, rows, axis=1)
+    covariance[:, diagonal, diagonal] += sensor_variance
     return covariance
 
 
@@ -293,9 +301,10 @@ def compute_whitening(
     rows = observations.rows
     repeats = observations.states.repeats[observations.state]
     if not noise.has_joint_error:
-        factors = (np.sqrt(repeats)[:, None] / noise.sensor_std(rows))[
-            ..., None
-        ] * np.eye(rows)
+        root = np.sqrt(repeats)
+        if observations.spread is not None:
+            root = root / observations.spread
+        factors = (root[:, None] / noise.sensor_std(rows))[..., None] * np.eye(rows)
         return Whitening(((np.arange(len(factors))[:, None], factors),))
     assert jacobian is not None
     group = observations.cluster if noise.pose_rad else observations.state
@@ -310,7 +319,13 @@ def compute_whitening(
         averaging = same_state / repeats_of_row[:, None, :]
         pose_covariance = noise.pose_rad**2 * (stacked @ stacked.transpose(0, 2, 1))
         covariance = (
-            averaging * compute_measurement_covariances(noise, of_members, rows)
+            averaging
+            * compute_measurement_covariances(
+                noise,
+                of_members,
+                rows,
+                None if observations.spread is None else observations.spread[members],
+            )
             + pose_covariance
         )
         blocks.append((members, np.linalg.inv(np.linalg.cholesky(covariance))))
@@ -514,7 +529,8 @@ class LeastSquaresProblem:
         turn = (
             self.whitened_at.frame_rotation.transpose(0, 2, 1) @ estimate.frame_rotation
         )
-        if (turn != np.eye(3)).any():
+        # Single numbers have no axes.
+        if (turn != np.eye(3)).any() and self.model.rows > 1:
             states = self.observations.states
             session = np.searchsorted(
                 estimate.sessions, states.session[self.observations.state]

@@ -6,7 +6,7 @@ instead of the rows of the measurements file.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -80,6 +80,11 @@ class Observations:
     state, target : (M,) int arrays, indices of the state and of the target
     position : (M, 3) array, m, in the frame of the session
     rotation : (M, 3, 3) array, measured orientation; None if positions are measured
+    channel : (M,) int array, see `Measurements`; None if everything is the position or
+        pose of a target. If it is not, `position` (M, 1) or (M, 3) and `rotation` hold
+        the numbers of the kind.
+    spread : (M,) array, standard deviation of each observation over that of the noise;
+        None if they are alike
     """
 
     states: States
@@ -87,14 +92,17 @@ class Observations:
     target: np.ndarray
     position: np.ndarray
     rotation: np.ndarray | None
+    channel: np.ndarray | None = None
+    spread: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.state)
 
     @property
     def rows(self) -> int:
-        """Numbers in one observation: 3 for a position, 6 for a pose."""
-        return 3 if self.rotation is None else 6
+        """Numbers in one observation: 3 for a position, 6 for a pose, or 1."""
+        width = self.position.shape[1]
+        return 6 if width == 3 and self.rotation is not None else width
 
     @property
     def cluster(self) -> np.ndarray:
@@ -168,7 +176,13 @@ def separate_measurements(measurements: Measurements) -> Observations:
     if measurements.rotation_vector is not None:
         rotation = Rotation.from_rotvec(measurements.rotation_vector).as_matrix()
     return Observations(
-        states, np.arange(count), measurements.target, measurements.position, rotation
+        states,
+        np.arange(count),
+        measurements.target,
+        measurements.position,
+        rotation,
+        measurements.channel,
+        measurements.spread,
     )
 
 
@@ -234,7 +248,14 @@ def _state_and_target_keys(measured: Measurements | Observations) -> np.ndarray:
         keys = _state_keys(measured.states)[measured.state]
     else:
         keys = _state_keys(measured)
-    return np.column_stack([keys, measured.target])
+    return np.column_stack([keys, *_target_keys(measured)])
+
+
+def _target_keys(measured: Measurements | Observations) -> list[np.ndarray]:
+    """Columns (N,) of integers, equal where target and channel are."""
+    if measured.channel is None:
+        return [measured.target]
+    return [measured.target, measured.channel]
 
 
 def _state_keys(measured: Measurements | States) -> np.ndarray:
@@ -251,9 +272,9 @@ def _average_equal_keys(measurements: Measurements, key: np.ndarray) -> Observat
     Measurements are of the same state if their rows of `key` (N, k) are equal.
     """
     first, state_of = group_equal_rows(key)
-    pairs = np.column_stack([state_of, measurements.target])
+    pairs = np.column_stack([state_of, *_target_keys(measurements)])
     first_of_pair, pair_of = group_equal_rows(pairs)
-    state, target = pairs[first_of_pair].T
+    state, target = pairs[first_of_pair, :2].T
     repeats = np.full(len(first), len(measurements))
     np.minimum.at(repeats, state, np.bincount(pair_of))
     row = measurements.row[first].copy()
@@ -280,8 +301,22 @@ def _average_equal_keys(measurements: Measurements, key: np.ndarray) -> Observat
         rotation = _mean_rotations(
             Rotation.from_rotvec(measurements.rotation_vector), first_of_pair, pair_of
         )
-    position = average_by_group(measurements.position, pair_of)
-    return Observations(states, state, target, position, rotation)
+    averaged = Observations(
+        states,
+        state,
+        target,
+        average_by_group(measurements.position, pair_of),
+        rotation,
+    )
+    if measurements.channel is None:
+        return averaged
+    first = first_of_pair
+    has_spread = measurements.spread is not None
+    return replace(
+        averaged,
+        channel=measurements.channel[first],
+        spread=measurements.spread[first] if has_spread else None,
+    )
 
 
 def _mean_rotations(
@@ -371,12 +406,16 @@ def _select(
     `new_number` (S,) is the index of each old state among the selected ones.
     """
     rotation = observations.rotation
+    channel = observations.channel
+    spread = observations.spread
     return Observations(
         observations.states.select(states),
         new_number[observations.state[indices]],
         observations.target[indices],
         observations.position[indices],
         None if rotation is None else rotation[indices],
+        None if channel is None else channel[indices],
+        None if spread is None else spread[indices],
     )
 
 
@@ -425,4 +464,7 @@ def sample_observations(
     sample = select_states(observations, chosen)
     sessions = np.isin(observations.states.session, sample.states.session)
     targets = np.isin(observations.target, sample.target)
-    return sample if sessions.all() and targets.all() else observations
+    has_all = sessions.all() and targets.all()
+    if observations.channel is not None and sample.channel is not None:
+        has_all &= np.isin(observations.channel, sample.channel).all()
+    return sample if has_all else observations

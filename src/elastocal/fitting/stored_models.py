@@ -28,6 +28,8 @@ def serialize_model(model: Model, estimate: Estimate) -> dict[str, Any]:
         stated[name] = getattr(estimate, name).tolist()
     for name in _EFFECT_PARAMETERS:
         stated[name] = [values.tolist() for values in getattr(estimate, name)]
+    if estimate.features:
+        stated["features"] = [values.tolist() for values in estimate.features]
     return {
         "effects": [effect.key for effect in model.effects],
         "priors": [_list_priors(effect) for effect in model.effects],
@@ -65,5 +67,7 @@ def restore_model(
         values[name] = np.array(document[name], float)
     for name in _EFFECT_PARAMETERS:
         values[name] = tuple(np.array(entry, float) for entry in document[name])
+    features = document.get("features", [])
+    values["features"] = tuple(np.array(entry, float) for entry in features)
     estimate = Estimate(tuple(document["sessions"]), **values)
     return replace(model, effects=tuple(effects)), estimate

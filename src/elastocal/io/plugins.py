@@ -1,4 +1,5 @@
-"""Effects, importers, controllers and regressions that other installed packages offer.
+"""Effects, importers, controllers, regressions and kinds of measurement that other
+installed packages offer.
 
 A package offers an object by an entry point in one of the groups below; the name of
 the entry point is its name in the catalogue:
@@ -27,7 +28,8 @@ EFFECTS = "elastocal.effects"
 IMPORTERS = "elastocal.importers"
 CONTROLLERS = "elastocal.controllers"
 REGRESSIONS = "elastocal.regressions"
-GROUPS = (EFFECTS, IMPORTERS, CONTROLLERS, REGRESSIONS)
+KINDS = "elastocal.kinds"
+GROUPS = (EFFECTS, IMPORTERS, CONTROLLERS, REGRESSIONS, KINDS)
 
 
 def load_plugins(

@@ -14,6 +14,7 @@ from elastocal.diagnosis.diagnose import Diagnosis, Step, diagnose
 from elastocal.diagnosis.next_experiment import propose_experiment
 from elastocal.diagnosis.search import screen_terms
 from elastocal.diagnosis.settings import Settings
+from elastocal.fitting.features import state_features
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import (
     Estimate,
@@ -322,6 +323,7 @@ def _stack_values(model: Model, estimate: Estimate) -> np.ndarray:
         ).as_rotvec()
         placement = np.concatenate([estimate.target_offset[target], rotation_vector])
         values.append(placement[fitted])
+    values += state_features(model.measuring, estimate.features)
     for pair in zip(estimate.coefficients, estimate.shapes, strict=True):
         values += pair
     return np.concatenate(values)

@@ -29,6 +29,7 @@ from elastocal.campaigns.measurements import (
     describe_columns,
     read_measurements,
 )
+from elastocal.campaigns.numbers import list_required_columns
 from elastocal.campaigns.writing import write_campaign
 from elastocal.errors import InputError
 from elastocal.exchange.measured_targets import (
@@ -42,6 +43,7 @@ from elastocal.io.documents import LARGEST_BYTES
 from elastocal.io.records import compute_sha256
 from elastocal.io.texts import read_text
 from elastocal.loop.loading import read_described_campaign
+from elastocal.measuring.channels import parse_measuring
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.validation.conformity import PASS, UNDECIDED, decide_conformity
 
@@ -434,9 +436,9 @@ def join_measurements(
 def _read_columns(folder: CampaignFolder) -> dict[str, np.ndarray]:
     """Read the columns of a campaign's measurements as they are in its file."""
     joints = folder.robot.joints
-    measured = folder.document["measured"]
-    cells = read_measurements(folder.path, joints, measured)
-    unread = ROTATION if measured == "position" else ()
+    plan = parse_measuring(folder.document, folder.source)
+    cells = read_measurements(folder.path, joints, list_required_columns(plan))
+    unread = () if plan.has_orientations else ROTATION
     columns: dict[str, np.ndarray] = {}
     for name, column in describe_columns(joints).items():
         if name not in cells.columns or name in unread:

@@ -54,14 +54,18 @@ def _describe_measurements(table: Columns, campaign: Document) -> dict[str, str]
     poses = len(_count_combinations(table, "session", "pose"))
     sessions = len(_count_combinations(table, "session"))
     states = len(_count_combinations(table, "session", "pose", "load"))
-    has_orientations = campaign["measured"] == "pose"
-    kind = "position and orientation" if has_orientations else "position"
+    measured = campaign["measured"]
+    names = [measured] if isinstance(measured, str) else measured
+    has_orientations = not {"pose", "board", "relative"}.isdisjoint(names)
+    kind = "position and orientation" if measured == "pose" else " or ".join(names)
     repeat_range = str(repeats.min())
     if repeats.min() < repeats.max():
         repeat_range += f" to {repeats.max()}, median {np.median(repeats):g}"
     frame = "the base's"
     if campaign["frame"] == "tracker":
         frame = "the tracker's; its placement is fitted"
+    elif campaign["frame"] == "unknown":
+        frame = "that of the features in each session; its placement is fitted"
     has_time = np.isfinite(table["time_s"]).any()
     return {
         "campaign": campaign["campaign"],

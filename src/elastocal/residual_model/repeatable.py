@@ -86,8 +86,10 @@ def detect_repeatable_residual(
     Returns
     -------
     RepeatableResidual or None
-        None with too few configurations.
+        None with too few configurations, or if measurements have no vectors.
     """
+    if fitted.model.rows == 1:
+        return None
     sample = sample_observations(observations, _MAX_OBSERVATIONS)
     if len(sample) < len(observations):
         fitted = fit_model(

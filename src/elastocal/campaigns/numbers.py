@@ -1,0 +1,166 @@
+"""Read what the rows of a campaign measured: numbers, kinds and features."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.campaigns.measurements import POSITION, ROTATION
+from elastocal.errors import suggest_names
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from elastocal.campaigns.campaign import Measurements
+    from elastocal.campaigns.tables import Cells
+    from elastocal.measuring.channels import MeasuringPlan
+    from elastocal.measuring.protocol import Kind
+
+_DOCUMENT = "campaign.yaml"
+
+
+def list_required_columns(plan: MeasuringPlan) -> list[str]:
+    """List the columns of numbers, kinds and features that a table must have."""
+    names = [name for kind in plan.kinds if not kind.touches for name in kind.columns]
+    if plan.features:
+        names.append("feature")
+    if sum(kind.reads_poses for kind in plan.kinds) > 1:
+        names.append("kind")
+    return list(dict.fromkeys(names))
+
+
+def read_numbers(
+    measurements: Measurements,
+    table: Cells,
+    plan: MeasuringPlan,
+    noise: Mapping[str, Any] | None,
+) -> Measurements:
+    """Read what each row measured.
+
+    Parameters
+    ----------
+    measurements : N rows, without what was measured.
+    table : their table.
+    plan : measuring plan of the campaign.
+    noise : declared noise, of which the spread of the measurements is taken.
+
+    Returns
+    -------
+    Measurements
+        N of them, or one for each number if rows have different numbers of them.
+    """
+    if not plan.channels:
+        return _read_poses(measurements, table, plan)
+    kind_of_row, feature_of_row = _find_kinds(table, plan)
+    channels = np.full((len(measurements), 6), -1)
+    numbers = np.zeros((len(measurements), 6))
+    for kind_index, kind in enumerate(plan.kinds):
+        rows = np.flatnonzero(kind_of_row == kind_index)
+        if not len(rows):
+            continue
+        width = len(kind.columns)
+        names = [name for name in kind.columns if name in table.columns]
+        if len(names) == width and width:
+            numbers[rows, :width] = table.select(rows).matrix(names)
+        for feature in np.unique(feature_of_row[rows]).tolist():
+            of_feature = rows[feature_of_row[rows] == feature]
+            found = plan.find_channels(kind, None if feature < 0 else feature)
+            channels[of_feature, : len(found)] = found
+    row, component = np.nonzero(channels >= 0)
+    measurements = measurements.select(row)
+    channel = channels[row, component]
+    if plan.rows == 1:
+        position = numbers[row, component][:, None]
+    else:
+        position = numbers[row, :3]
+    # A component of a rotation means nothing without the others.
+    rotation_vector = numbers[row, 3:] if plan.has_orientations else None
+    return replace(
+        measurements,
+        position=position,
+        rotation_vector=rotation_vector,
+        channel=channel,
+        spread=_compute_spread(channel, plan, noise),
+    )
+
+
+def _read_poses(
+    measurements: Measurements, table: Cells, plan: MeasuringPlan
+) -> Measurements:
+    """Read rows that are poses or positions of the target."""
+    kind = plan.kinds[0]
+    position = table.matrix(POSITION)
+    if kind.numbers == 3:
+        return replace(measurements, position=position)
+    rotation_vector = table.matrix(ROTATION)
+    rotation = Rotation.from_rotvec(rotation_vector).as_matrix()
+    converted, turned = kind.convert(position, rotation, {"camera": plan.camera})
+    if turned is not None and turned is not rotation:
+        rotation_vector = Rotation.from_matrix(turned).as_rotvec()
+    return replace(measurements, position=converted, rotation_vector=rotation_vector)
+
+
+def _find_kinds(table: Cells, plan: MeasuringPlan) -> tuple[np.ndarray, np.ndarray]:
+    """Find the kind and the feature of each row, (N,) int arrays; -1 for no feature.
+
+    A row that names no kind has that of its feature, or else the only kind that reads
+    poses.
+    """
+    count = len(table.rows)
+    kinds = table.texts("kind") if "kind" in table.columns else [""] * count
+    features = table.texts("feature") if "feature" in table.columns else [""] * count
+    names = [kind.name for kind in plan.kinds]
+    feature_names = [feature.name for feature in plan.features]
+    of_poses = [kind.name for kind in plan.kinds if kind.reads_poses]
+    kind_of_row = np.zeros(count, int)
+    feature_of_row = np.full(count, -1)
+    for row, (kind, feature) in enumerate(zip(kinds, features, strict=True)):
+        if feature and feature not in feature_names:
+            allowed = (
+                f"a feature of {_DOCUMENT}: {suggest_names(feature, feature_names)}"
+            )
+            raise table.fault(row, "feature", allowed)
+        if feature:
+            feature_of_row[row] = feature_names.index(feature)
+        implied = plan.features[feature_of_row[row]].kind if feature else ""
+        if not feature and len(of_poses) == 1:
+            implied = of_poses[0]
+        name = kind or implied
+        if name not in names:
+            column = "kind" if "kind" in table.columns else "feature"
+            allowed = f"a kind of `measured` of {_DOCUMENT}: {', '.join(names)}"
+            if column == "feature":
+                allowed = f"a feature of {_DOCUMENT}: {', '.join(feature_names)}"
+            raise table.fault(row, column, allowed)
+        kind_of_row[row] = names.index(name)
+        _check_feature(table, row, plan.kinds[kind_of_row[row]], implied)
+    return kind_of_row, feature_of_row
+
+
+def _check_feature(table: Cells, row: int, kind: Kind, implied: str) -> None:
+    """Refuse a row of a kind with features that names none of this kind."""
+    if not kind.reads_poses and implied != kind.name:
+        allowed = f"a feature of kind {kind.name}"
+        raise table.fault(row, "feature", allowed)
+
+
+def _compute_spread(
+    channel: np.ndarray, plan: MeasuringPlan, noise: Mapping[str, Any] | None
+) -> np.ndarray | None:
+    """Standard deviation of each measurement (N,) over that of the declared noise; None
+    if nothing is declared by kind."""
+    if noise is None or "position_m" not in noise:
+        return None
+    by_kind = noise.get("by_kind", {})
+    position_m = noise["position_m"]
+    ratios = []
+    for entry in plan.channels:
+        std = by_kind.get(entry.kind.name, position_m)
+        if entry.is_angle:
+            std = noise.get("orientation_rad", position_m)
+        ratios.append(std / position_m)
+    spread = np.array(ratios)[channel]
+    return None if (spread == 1.0).all() else spread

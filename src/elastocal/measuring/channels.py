@@ -1,0 +1,246 @@
+"""What a campaign measures: its kinds, its features, and the channels that its rows are.
+
+A channel is a kind of measurement of one feature. If all kinds of a campaign have equally
+many numbers, a row is one measurement of so many numbers. Otherwise each number of a row
+is a measurement of its own, with a channel for each component.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elastocal.errors import InputError, suggest_names
+from elastocal.measuring.catalogue import list_kinds
+from elastocal.measuring.protocol import Feature, Kind
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+_KEY = "features"
+# Places that the distances between them put into one frame.
+_MOST_PLACES_BY_DISTANCES = 3
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One kind of measurement of one feature, or one component of it.
+
+    Attributes
+    ----------
+    kind : the kind.
+    feature : index of the feature; None if the kind has none.
+    component : number of the component; None for all of them.
+    """
+
+    kind: Kind
+    feature: int | None = None
+    component: int | None = None
+
+    @property
+    def is_angle(self) -> bool:
+        """Whether the numbers are of rotations alone, rad."""
+        return self.component is not None and self.component >= 3
+
+
+@dataclass(frozen=True)
+class MeasuringPlan:
+    """Kinds, features and channels of a campaign.
+
+    Attributes
+    ----------
+    kinds : kinds of its rows.
+    features : what is touched, or against which is measured.
+    channels : channels of its measurements; empty if every row is the pose or position
+        of a target, which needs neither features nor components.
+    rows : numbers in one measurement.
+    camera : where the camera of boards is; empty if not stated.
+    """
+
+    kinds: tuple[Kind, ...]
+    features: tuple[Feature, ...] = ()
+    channels: tuple[Channel, ...] = ()
+    rows: int = 3
+    camera: str = ""
+
+    @property
+    def has_orientations(self) -> bool:
+        """Whether any row states an orientation."""
+        return any(kind.numbers == 6 for kind in self.kinds)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Columns with the numbers of all kinds, in their order."""
+        names = [name for kind in self.kinds for name in kind.columns]
+        return tuple(dict.fromkeys(names))
+
+    def find_channels(self, kind: Kind, feature: int | None) -> list[int]:
+        """Indices of the channels of a row."""
+        return [
+            index
+            for index, channel in enumerate(self.channels)
+            if channel.kind is kind and channel.feature == feature
+        ]
+
+
+def parse_measuring(document: Mapping[str, Any], source: str) -> MeasuringPlan:
+    """Parse kinds and features of ``campaign.yaml``.
+
+    Raises
+    ------
+    InputError
+        A kind is unknown, or a feature is not as its kind needs it.
+    """
+    known = list_kinds()
+    measured = document["measured"]
+    names = [measured] if isinstance(measured, str) else list(measured)
+    for name in names:
+        if name not in known:
+            allowed = suggest_names(name, list(known))
+            raise InputError(source, "measured", repr(name), allowed)
+    kinds = tuple(known[name] for name in dict.fromkeys(names))
+    features = _parse_features(document, kinds, source)
+    numbers = {kind.numbers for kind in kinds}
+    rows = numbers.pop() if len(numbers) == 1 else 1
+    plan = MeasuringPlan(kinds, features, (), rows, document.get("camera", ""))
+    if len(kinds) == 1 and kinds[0].reads_poses:
+        return plan
+    return replace(plan, channels=_list_channels(kinds, features, rows))
+
+
+def _list_channels(
+    kinds: Sequence[Kind], features: Sequence[Feature], rows: int
+) -> tuple[Channel, ...]:
+    """List the channels of every kind and feature, with components if rows have several
+    numbers and a measurement has one."""
+    channels: list[Channel] = []
+    for kind in kinds:
+        indices: list[int | None] = [None]
+        if not kind.reads_poses:
+            indices = [
+                index
+                for index, feature in enumerate(features)
+                if feature.kind == kind.name
+            ]
+        for index in indices:
+            if kind.numbers == rows:
+                channels.append(Channel(kind, index))
+            else:
+                channels += [
+                    Channel(kind, index, component) for component in range(kind.numbers)
+                ]
+    return tuple(channels)
+
+
+def _parse_features(
+    document: Mapping[str, Any], kinds: Sequence[Kind], source: str
+) -> tuple[Feature, ...]:
+    """Parse the features, each of a kind of the campaign."""
+    with_features = [kind for kind in kinds if not kind.reads_poses]
+    described = document.get(_KEY, {})
+    by_name = {kind.name: kind for kind in with_features}
+    features = []
+    for name, keys in described.items():
+        if not isinstance(name, str):
+            allowed = "a name, in quotes where need be"
+            raise InputError(source, _KEY, f"the name {name!r}", allowed)
+        stated = {key: value for key, value in keys.items() if key != "kind"}
+        kind = keys.get("kind", with_features[0].name if len(by_name) == 1 else "")
+        if kind not in by_name:
+            allowed = (
+                f"a kind of `measured` with features: {', '.join(by_name) or 'none'}"
+            )
+            raise InputError(source, f"{_KEY}.{name}.kind", repr(kind), allowed)
+        features.append(Feature(name, kind, stated, source))
+    features = _place_by_distances(document, features, source)
+    for feature in features:
+        by_name[feature.kind].check(feature)
+    for kind in with_features:
+        if all(feature.kind != kind.name for feature in features):
+            allowed = f"a feature with kind: {kind.name}"
+            raise InputError(source, _KEY, f"none of kind {kind.name}", allowed)
+    return tuple(features)
+
+
+def _place_by_distances(
+    document: Mapping[str, Any], features: list[Feature], source: str
+) -> list[Feature]:
+    """Turn stated distances between two or three places into coordinates with standard
+    deviations, in a frame with the first place at its origin."""
+    distances = document.get("distances", [])
+    if not distances:
+        return features
+    key = "distances"
+    if document["frame"] == "base":
+        allowed = "frame: unknown, because distances say nothing of the base"
+        raise InputError(source, key, "frame: base", allowed)
+    names = [feature.name for feature in features if feature.kind == "point"]
+    stated = {}
+    for index, entry in enumerate(distances):
+        for name in entry["between"]:
+            if name not in names:
+                where = f"{key}[{index}].between"
+                raise InputError(source, where, repr(name), suggest_names(name, names))
+        stated[frozenset(entry["between"])] = (entry["distance_m"], entry["std_m"])
+    joined = [name for name in names if any(name in pair for pair in stated)]
+    pairs = [
+        frozenset((first, second))
+        for number, second in enumerate(joined)
+        for first in joined[:number]
+    ]
+    if len(joined) > _MOST_PLACES_BY_DISTANCES or any(p not in stated for p in pairs):
+        found = f"{len(stated)} distances of {len(joined)} places"
+        allowed = "one of two places, or all three of three; otherwise state position_m"
+        raise InputError(source, key, found, allowed)
+    coordinates, deviations = _trilaterate(*np.array([stated[p] for p in pairs]).T)
+    if not np.isfinite(coordinates).all():
+        allowed = "distances of a triangle"
+        raise InputError(source, key, "three distances that no triangle has", allowed)
+    placed = {
+        name: _state_place(name, features, coordinates[number], deviations[number])
+        for number, name in enumerate(joined)
+    }
+    return [placed.get(feature.name, feature) for feature in features]
+
+
+def _state_place(
+    name: str,
+    features: Sequence[Feature],
+    position_m: np.ndarray,
+    std_m: np.ndarray,
+) -> Feature:
+    """State a place (3,) and its standard deviations (3,) in a feature without one."""
+    feature = next(feature for feature in features if feature.name == name)
+    if "position_m" in feature.stated:
+        where = f"{_KEY}.{name}.position_m"
+        found = "beside distances of this place"
+        raise InputError(feature.source, where, found, "one of them")
+    keys = {"position_m": position_m.tolist(), "std_m": std_m.tolist()}
+    return replace(feature, stated={**feature.stated, **keys})
+
+
+def _trilaterate(
+    distances: np.ndarray, deviations: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates (3, 3) of the places A, B, C, and their standard deviations, from the
+    distances AB, AC, BC or AB alone. A is the origin, B on x, C in the plane of x and y;
+    what this defines is exact. Not a number if no triangle has these distances.
+    """
+    coordinates = np.zeros((3, 3))
+    variances = np.zeros((3, 3))
+    along = distances[0]
+    coordinates[1, 0] = along
+    variances[1, 0] = deviations[0] ** 2
+    if len(distances) == 3:
+        to_first, to_second = distances[1:]
+        x = (to_first**2 + along**2 - to_second**2) / (2.0 * along)
+        square = to_first**2 - x**2
+        y = np.sqrt(square) if square > 0.0 else np.nan
+        slopes = np.array([1.0 - x / along, to_first / along, -to_second / along])
+        coordinates[2, :2] = x, y
+        variances[2, 0] = (slopes * deviations) @ (slopes * deviations)
+        slopes = (np.array([0.0, to_first, 0.0]) - x * slopes) / y
+        variances[2, 1] = (slopes * deviations) @ (slopes * deviations)
+    return coordinates, np.sqrt(variances)

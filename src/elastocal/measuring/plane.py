@@ -1,0 +1,85 @@
+"""A tip on a plane: a granite table, a face of a cube, a wall that a probe touches.
+
+The reading is the height of the target over the plane, zero where it touches: the
+radius of a touching ball shifts the plane and nothing else.
+"""
+
+from typing import ClassVar
+
+import numpy as np
+
+from elastocal.measuring.protocol import (
+    ANYWHERE_M,
+    ANYWHERE_RAD,
+    Feature,
+    Kind,
+    Prediction,
+    Unknown,
+    predict_along,
+    read_direction,
+    span_plane,
+)
+
+
+class Plane(Kind):
+    """Height of the target over a plane, m."""
+
+    name = "plane"
+    meaning = "height of the target over an unknown plane, 0 where it touches"
+    numbers = 1
+    columns = ("value",)
+    touches = True
+    direction_key = "normal"
+    keys: ClassVar = {
+        "normal": "[x, y, z] out of the plane towards the robot, roughly, or unknown"
+    }
+
+    def unknowns(self, feature: Feature) -> tuple[Unknown, ...]:
+        """List two tilts and the height of the plane."""
+        read_direction(feature, self.direction_key)
+        return (
+            Unknown("tilt1", "rad", ANYWHERE_RAD),
+            Unknown("tilt2", "rad", ANYWHERE_RAD),
+            Unknown("height", "m", ANYWHERE_M),
+        )
+
+    def start(
+        self, feature: Feature, position: np.ndarray, numbers: np.ndarray
+    ) -> np.ndarray:
+        """Start at the plane through the targets; values are normal and height."""
+        centre = position.mean(axis=0)
+        axes = np.linalg.svd(position - centre, full_matrices=True)[2]
+        normal = axes[-1]
+        stated = read_direction(feature, self.direction_key)
+        if stated is not None:
+            normal = stated
+        elif normal[np.argmax(np.abs(normal))] < 0.0:
+            normal = -normal
+        return np.array([*normal, normal @ centre - numbers[:, 0].mean()])
+
+    def evaluate(
+        self,
+        position: np.ndarray,
+        rotation: np.ndarray,
+        numbers: np.ndarray,
+        values: np.ndarray,
+    ) -> Prediction:
+        """Predict heights over the plane; see `Kind.evaluate`."""
+        normal = values[:3]
+        height = position @ normal - values[3]
+        by_unknowns = np.column_stack(
+            [position @ span_plane(normal).T, -np.ones(len(position))]
+        )
+        return predict_along(numbers[:, 0] - height, normal, by_unknowns)
+
+    def state(self, values: np.ndarray) -> np.ndarray:
+        """Return the direction cosines of the normal with x and y, and the height."""
+        return values[[0, 1, 3]]
+
+    def move(self, values: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """Tilt the normal and lift the plane."""
+        normal = values[:3] + step[:2] @ span_plane(values[:3])
+        return np.array([*(normal / np.linalg.norm(normal)), values[3] + step[2]])
+
+
+PLANE = Plane()

@@ -1,0 +1,68 @@
+"""A ball in a socket, a tip in a cone: the target is where a place is.
+
+A row has no number. What it says is that the target was in the place at these joint
+angles. The place is known, known to so much, or unknown.
+"""
+
+from typing import ClassVar
+
+import numpy as np
+
+from elastocal.measuring.protocol import (
+    Feature,
+    Kind,
+    Prediction,
+    Unknown,
+    describe_point,
+    read_vector,
+)
+
+
+class Point(Kind):
+    """Target in a place."""
+
+    name = "point"
+    meaning = "the target is in a place: a ball in a socket, a tip in a cone"
+    numbers = 3
+    keys: ClassVar = {
+        "position_m": "[x, y, z] in the frame of the session, or unknown",
+        "std_m": "standard deviation of the stated coordinates: one number or three, "
+        "0.0002 where it is left out, 0 where they are exact by definition",
+    }
+
+    def unknowns(self, feature: Feature) -> tuple[Unknown, ...]:
+        """List the coordinates of the place."""
+        return describe_point(feature)
+
+    def locate(self, feature: Feature) -> np.ndarray | None:
+        """Return the stated place."""
+        return read_vector(feature, "position_m")
+
+    def start(
+        self, feature: Feature, position: np.ndarray, numbers: np.ndarray
+    ) -> np.ndarray:
+        """Start at the stated place, or in the middle of the targets."""
+        stated = read_vector(feature, "position_m")
+        return position.mean(axis=0) if stated is None else stated
+
+    def evaluate(
+        self,
+        position: np.ndarray,
+        rotation: np.ndarray,
+        numbers: np.ndarray,
+        values: np.ndarray,
+    ) -> Prediction:
+        """Predict how far the target is from the place; see `Kind.evaluate`."""
+        count = len(position)
+        by_pose = np.zeros((count, 3, 6))
+        by_pose[:, :, :3] = np.eye(3)
+        by_place = np.tile(-np.eye(3), (count, 1, 1))
+        return Prediction(values - position, by_pose, by_place)
+
+    def deviate(self, feature: Feature, values: np.ndarray) -> np.ndarray:
+        """Return how far the place is from where it was stated."""
+        stated = read_vector(feature, "position_m")
+        return np.zeros(3) if stated is None else values - stated
+
+
+POINT = Point()

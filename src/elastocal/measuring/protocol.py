@@ -1,0 +1,280 @@
+"""What a kind of measurement states, so that everything else treats all kinds alike.
+
+A kind predicts its readings from the pose of a target in the frame of the session and
+from the unknowns of a feature: a place that is touched, a plane, an anchor. The engine
+multiplies the derivative in the pose with the Jacobian of the chain and fits the
+unknowns together with the robot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from elastocal.errors import InputError
+
+# Sizes of unknowns that may be anywhere in a workshop, m and rad.
+ANYWHERE_M = 1.0
+ANYWHERE_RAD = 1.0
+# Standard deviation of what is stated of a feature without one: a caliper, or a print.
+STATED_STD_M = 2e-4
+# Largest standard deviation that says anything of a feature, m or rad.
+LARGEST_STD = 1.0
+# A shorter vector has no direction.
+SHORTEST_DIRECTION = 1e-9
+UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One parameter of a feature that every fit estimates.
+
+    Attributes
+    ----------
+    name, unit : as tables and reports have them; SI units.
+    plausible : size that the parameter may have.
+    prior_std : standard deviation of the normal prior about the declared value; None if
+        nothing is declared, 0 if the declared value is exact and not fitted.
+    """
+
+    name: str
+    unit: str
+    plausible: float
+    prior_std: float | None = None
+
+
+@dataclass(frozen=True)
+class Feature:
+    """Something that is touched, or against which is measured, as campaign.yaml has it.
+
+    Attributes
+    ----------
+    name : name of the feature.
+    kind : name of its kind of measurement.
+    stated : other keys of the feature, checked by the kind.
+    source : file of the campaign, for messages.
+    """
+
+    name: str
+    kind: str
+    stated: Mapping[str, Any] = field(default_factory=dict)
+    source: str = "campaign.yaml"
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Residuals of M readings of one feature, and derivatives of what is predicted.
+
+    Attributes
+    ----------
+    residual : (M, r) array, read minus predicted, m and rad.
+    by_pose : (M, r, 6) array, derivative of the prediction in the position (m) and the
+        rotation (rad) of the target, both in the axes of the session.
+    by_unknowns : (M, r, K) array, derivative in the unknowns of the feature.
+    """
+
+    residual: np.ndarray
+    by_pose: np.ndarray
+    by_unknowns: np.ndarray
+
+
+class Kind:
+    """One kind of measurement. A subclass with the attributes below is all it needs.
+
+    Attributes
+    ----------
+    name : value of ``measured`` and ``kind`` in campaign.yaml and measurements.csv.
+    meaning : one line, what a row measures.
+    numbers : numbers in a row: 1, 3 or 6. Several numbers are components of a vector
+        in the axes of the session, m, followed by those of a rotation, rad.
+    columns : columns that the user writes for a row.
+    touches : whether a table without its columns means zeros: contact.
+    keys : keys of a feature of this kind, each with its meaning; None if rows refer to
+        no feature.
+    """
+
+    name: str
+    meaning: str
+    numbers: int
+    columns: Sequence[str] = ()
+    touches: bool = False
+    keys: ClassVar[Mapping[str, str] | None] = None
+
+    @property
+    def reads_poses(self) -> bool:
+        """Whether a row is the pose or position of the target in the session's frame,
+        or can be converted to it without any unknown."""
+        return self.keys is None
+
+    def check(self, feature: Feature) -> None:
+        """Refuse a feature whose keys are not those of the kind, or not of their form."""
+        keys = self.keys or {}
+        for key in feature.stated:
+            if key not in keys:
+                allowed = ", ".join(keys) or "no key but kind"
+                where = f"features.{feature.name}.{key}"
+                raise InputError(feature.source, where, "an unknown key", allowed)
+        self.unknowns(feature)
+
+    def convert(
+        self,
+        position: np.ndarray,
+        rotation: np.ndarray | None,
+        options: Mapping[str, Any],
+    ) -> tuple[np.ndarray, np.ndarray | None]:
+        """Convert readings (N, 3), (N, 3, 3) to poses of the target in the session."""
+        return position, rotation
+
+    def unknowns(self, feature: Feature) -> tuple[Unknown, ...]:
+        """List the K unknowns of a feature, in the order of steps of a fit."""
+        return ()
+
+    def locate(self, feature: Feature) -> np.ndarray | None:
+        """Return where the target of every row is, (3,) m in the session, if the feature
+        states it."""
+        return None
+
+    def start(
+        self, feature: Feature, position: np.ndarray, numbers: np.ndarray
+    ) -> np.ndarray:
+        """Find values of a feature from which a fit converges.
+
+        Parameters
+        ----------
+        feature : the feature.
+        position : (M, 3) array, m, nominal positions of the targets in the session.
+        numbers : (M, r) array, readings.
+
+        Returns
+        -------
+        (V,) array, in the layout of `evaluate`
+        """
+        return np.zeros(0)
+
+    def evaluate(
+        self,
+        position: np.ndarray,
+        rotation: np.ndarray,
+        numbers: np.ndarray,
+        values: np.ndarray,
+    ) -> Prediction:
+        """Predict readings from poses and from the values (V,) of their feature.
+
+        Parameters
+        ----------
+        position, rotation : (M, 3) and (M, 3, 3) arrays, pose of the target in the
+            frame of the session, m.
+        numbers : (M, r) array, readings.
+        values : (V,) array.
+        """
+        raise NotImplementedError
+
+    def move(self, values: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """Move the values (V,) of a feature by a step (K,) of its unknowns."""
+        return values + step
+
+    def state(self, values: np.ndarray) -> np.ndarray:
+        """Return what tables say of the unknowns (K,) of a feature: absolute values."""
+        return values
+
+    def deviate(self, feature: Feature, values: np.ndarray) -> np.ndarray:
+        """Return how far the unknowns (K,) are from their declared values; only those
+        with a prior matter."""
+        return np.zeros(len(self.unknowns(feature)))
+
+
+def read_vector(feature: Feature, key: str) -> np.ndarray | None:
+    """Read three numbers of a feature; None if they are unknown or left out."""
+    stated = feature.stated.get(key, UNKNOWN)
+    if stated == UNKNOWN:
+        return None
+    is_vector = isinstance(stated, list | tuple) and len(stated) == 3
+    if not is_vector or not all(map(_is_number, stated)):
+        raise refuse_key(feature, key, "unknown, or three numbers [x, y, z]")
+    return np.array(stated, float)
+
+
+def read_direction(feature: Feature, key: str) -> np.ndarray | None:
+    """Read a direction of a feature as a unit vector; None if it is unknown."""
+    direction = read_vector(feature, key)
+    if direction is None:
+        return None
+    length = float(np.linalg.norm(direction))
+    if length < SHORTEST_DIRECTION:
+        raise refuse_key(feature, key, "a direction, not zero")
+    return direction / length
+
+
+def read_number(feature: Feature, key: str) -> float | None:
+    """Read a number of a feature; None if it is unknown or left out."""
+    stated = feature.stated.get(key, UNKNOWN)
+    if stated == UNKNOWN:
+        return None
+    if not _is_number(stated):
+        raise refuse_key(feature, key, "unknown, or a number")
+    return float(stated)
+
+
+def read_std(feature: Feature, key: str, count: int = 1) -> np.ndarray:
+    """Read standard deviations (count,) of what is stated: one number, or one each."""
+    stated = feature.stated.get(key, STATED_STD_M)
+    listed = stated if isinstance(stated, list | tuple) else [stated] * count
+    is_valid = len(listed) == count and all(map(_is_number, listed))
+    if not is_valid or not all(0.0 <= value <= LARGEST_STD for value in listed):
+        noun = "a number" if count == 1 else f"a number, or {count} of them"
+        allowed = f"{noun} from 0 (exact) to {LARGEST_STD:g}, in m or rad"
+        raise refuse_key(feature, key, allowed)
+    return np.array(listed, float)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def refuse_key(feature: Feature, key: str, allowed: str) -> InputError:
+    """Return the error of one key of a feature."""
+    where = f"features.{feature.name}.{key}"
+    return InputError(feature.source, where, repr(feature.stated.get(key)), allowed)
+
+
+def describe_point(
+    feature: Feature, key: str = "position_m", std_key: str = "std_m"
+) -> tuple[Unknown, ...]:
+    """Describe the three coordinates of a point: unknown, or stated with priors."""
+    if read_vector(feature, key) is None:
+        return tuple(Unknown(name, "m", ANYWHERE_M) for name in "xyz")
+    deviations = read_std(feature, std_key, 3).tolist()
+    return tuple(
+        Unknown(name, "m", std, std)
+        for name, std in zip("xyz", deviations, strict=True)
+    )
+
+
+def describe_number(feature: Feature, key: str, std_key: str) -> Unknown:
+    """Describe one length of a feature: unknown, or stated with a prior."""
+    name = key.removesuffix("_m")
+    if read_number(feature, key) is None:
+        return Unknown(name, "m", ANYWHERE_M)
+    std = float(read_std(feature, std_key)[0])
+    return Unknown(name, "m", std, std)
+
+
+def span_plane(normal: np.ndarray) -> np.ndarray:
+    """Two unit vectors (2, 3) that span the plane with a unit normal (3,)."""
+    axis = np.eye(3)[np.argmin(np.abs(normal))]
+    first = np.cross(normal, axis)
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(normal, first)])
+
+
+def predict_along(
+    residual: np.ndarray, direction: np.ndarray, by_unknowns: np.ndarray
+) -> Prediction:
+    """Make the prediction of readings (M,) that grow along directions (M, 3) or (3,) of
+    the target's position; derivatives (M, K) in the unknowns."""
+    by_pose = np.zeros((len(residual), 1, 6))
+    by_pose[:, 0, :3] = direction
+    return Prediction(residual[:, None], by_pose, by_unknowns[:, None])

@@ -1,0 +1,94 @@
+"""A tip on a sphere: a calibration ball that a probe touches.
+
+The reading is the height of the target over the sphere, zero where it touches. The
+radius contains that of the tip.
+"""
+
+from typing import ClassVar
+
+import numpy as np
+
+from elastocal.measuring.protocol import (
+    Feature,
+    Kind,
+    Prediction,
+    Unknown,
+    describe_number,
+    describe_point,
+    predict_along,
+    read_number,
+    read_vector,
+)
+
+
+class Sphere(Kind):
+    """Height of the target over a sphere, m."""
+
+    name = "sphere"
+    meaning = "height of the target over an unknown sphere, 0 where it touches"
+    numbers = 1
+    columns = ("value",)
+    touches = True
+    keys: ClassVar = {
+        "position_m": "centre [x, y, z] in the frame of the session, or unknown",
+        "std_m": "standard deviation of the stated coordinates, 0.0002 if left out",
+        "radius_m": "radius of the sphere and of the tip together, or unknown",
+        "radius_std_m": "standard deviation of the stated radius, 0.0002 if left out",
+    }
+
+    def unknowns(self, feature: Feature) -> tuple[Unknown, ...]:
+        """List centre and radius."""
+        return (
+            *describe_point(feature),
+            describe_number(feature, "radius_m", "radius_std_m"),
+        )
+
+    def start(
+        self, feature: Feature, position: np.ndarray, numbers: np.ndarray
+    ) -> np.ndarray:
+        """Start at the sphere through the targets, fitted algebraically [1]_.
+
+        References
+        ----------
+        .. [1] Pratt, Direct least-squares fitting of algebraic surfaces, 1987.
+        """
+        columns = np.column_stack([2.0 * position, np.ones(len(position))])
+        squares = (position**2).sum(axis=1)
+        solution = np.linalg.lstsq(columns, squares, rcond=None)[0]
+        centre = read_vector(feature, "position_m")
+        if centre is None:
+            centre = solution[:3]
+        radius = read_number(feature, "radius_m")
+        if radius is None:
+            distances = np.linalg.norm(position - centre, axis=1)
+            radius = float((distances - numbers[:, 0]).mean())
+        return np.array([*centre, radius])
+
+    def evaluate(
+        self,
+        position: np.ndarray,
+        rotation: np.ndarray,
+        numbers: np.ndarray,
+        values: np.ndarray,
+    ) -> Prediction:
+        """Predict heights over the sphere; see `Kind.evaluate`."""
+        from_centre = position - values[:3]
+        distance = np.linalg.norm(from_centre, axis=1)
+        direction = from_centre / distance[:, None]
+        by_unknowns = np.column_stack([-direction, -np.ones(len(position))])
+        residual = numbers[:, 0] - (distance - values[3])
+        return predict_along(residual, direction, by_unknowns)
+
+    def deviate(self, feature: Feature, values: np.ndarray) -> np.ndarray:
+        """Return how far centre and radius are from what was stated."""
+        deviation = np.zeros(4)
+        centre = read_vector(feature, "position_m")
+        radius = read_number(feature, "radius_m")
+        if centre is not None:
+            deviation[:3] = values[:3] - centre
+        if radius is not None:
+            deviation[3] = values[3] - radius
+        return deviation
+
+
+SPHERE = Sphere()

@@ -1,0 +1,52 @@
+"""The kind `plane`: its derivatives, and parameters that come back from a simulation."""
+
+import numpy as np
+from checked_kinds import check_derivatives
+from contact_campaigns import (
+    TOOL_M,
+    count_std_errors,
+    fit_contacts,
+    open_workshop,
+    spread_places,
+    write_contacts,
+)
+
+from elastocal.measuring.plane import PLANE
+from elastocal_proof.plant.contacts import touch_plane
+
+NORMALS = np.array([[0.0, 0.0, 1.0], [0.8, 0.6, 0.0], [0.0, 0.8, 0.6]])
+
+
+def measure(seed):
+    """Rows of a tip on three planes."""
+    workshop = open_workshop(seed)
+    (place,) = spread_places(workshop, 1)
+    return [
+        {
+            "angles": touch_plane(workshop, normal, normal @ place, 3e-5),
+            "feature": f"plane{number}",
+        }
+        for number, normal in enumerate(NORMALS)
+        for _ in range(25)
+    ]
+
+
+DOCUMENT = {
+    "measured": "plane",
+    "features": {f"plane{number}": {"kind": "plane"} for number in range(3)},
+    "noise": {"position_m": 3e-5},
+}
+
+
+def test_derivatives_are_those_of_the_residual():
+    check_derivatives(PLANE, np.array([0.6, 0.0, 0.8, 0.3]), np.zeros((4, 1)))
+
+
+def test_joint_offsets_and_tool_come_back_within_their_standard_errors(tmp_path):
+    fitted = fit_contacts(write_contacts(tmp_path / "cell", DOCUMENT, measure(2)))
+    assert fitted.converged
+    # Four offsets are identifiable: 4 standard errors are exceeded in 1 of 4,000 fits.
+    deviations = count_std_errors(fitted)
+    assert len(deviations) == 4
+    assert np.abs(deviations).max() < 4.0
+    np.testing.assert_allclose(fitted.estimate.target_offset[0], TOOL_M, atol=3e-4)

@@ -1,0 +1,71 @@
+"""Contacts are where they should be, and readings have the errors of their instrument."""
+
+import numpy as np
+import pytest
+
+from elastocal_proof.plant.contacts import (
+    Workshop,
+    read_gauge,
+    read_length,
+    seat_in_socket,
+    see_board,
+    touch_plane,
+    touch_sphere,
+)
+
+
+def locate(angles):
+    """A planar arm of two links of 1 m on a column that turns."""
+    turn, first, second = angles.T
+    reach = np.cos(first) + np.cos(first + second)
+    height = np.sin(first) + np.sin(first + second)
+    position = np.stack([reach * np.cos(turn), reach * np.sin(turn), height], axis=-1)
+    return position, np.tile(np.eye(3), (len(angles), 1, 1))
+
+
+@pytest.fixture
+def workshop():
+    limits = np.array([[-2.0, 2.0], [-1.0, 1.5], [0.2, 2.0]])
+    return Workshop(locate, limits, np.random.default_rng(1))
+
+
+def test_a_contact_without_play_is_exact(workshop):
+    place = np.array([1.0, 0.5, 0.7])
+    seat = workshop.find_tool(seat_in_socket(workshop, place, 0.0))[0]
+    np.testing.assert_allclose(seat, place, atol=1e-10)
+    normal = np.array([0.0, 0.6, 0.8])
+    tip = workshop.find_tool(touch_plane(workshop, normal, 0.5, 0.0))[0]
+    assert abs(normal @ tip - 0.5) < 1e-10
+    tip = workshop.find_tool(touch_sphere(workshop, place, 0.1, 0.0))[0]
+    assert abs(np.linalg.norm(tip - place) - 0.1) < 1e-10
+
+
+def test_play_and_noise_have_their_standard_deviations(workshop):
+    place = np.array([1.0, 0.5, 0.7])
+    seats = [
+        workshop.find_tool(seat_in_socket(workshop, place, 1e-4))[0] for _ in range(60)
+    ]
+    # 180 numbers: the standard deviation is within 16 % with probability 0.997.
+    assert np.std(np.array(seats) - place) == pytest.approx(1e-4, rel=0.16)
+    angles = workshop.draw_angles()
+    lengths = [read_length(workshop, angles, place, 1e-4) for _ in range(400)]
+    gauge = [read_gauge(workshop, angles, np.eye(3)[0], 1e-5) for _ in range(400)]
+    assert np.std(lengths) == pytest.approx(1e-4, rel=0.12)
+    assert np.std(gauge) == pytest.approx(1e-5, rel=0.12)
+
+
+def test_a_board_is_less_certain_along_the_view_and_far_away(workshop):
+    angles = workshop.draw_angles()
+    position, rotation = workshop.find_tool(angles)
+    scatter = []
+    for range_m in (0.5, 1.0):
+        board = (position + rotation @ np.array([0, 0, range_m]), rotation)
+        seen = [see_board(workshop, angles, board, 1e-4, 0.2)[0] for _ in range(400)]
+        scatter.append(np.std(seen, axis=0))
+    np.testing.assert_allclose(scatter[0], [5e-5, 5e-5, 1.25e-4], rtol=0.15)
+    np.testing.assert_allclose(scatter[1], [1e-4, 1e-4, 5e-4], rtol=0.15)
+
+
+def test_what_is_out_of_reach_is_said(workshop):
+    with pytest.raises(ValueError, match="does not reach"):
+        seat_in_socket(workshop, np.array([9.0, 0.0, 0.0]), 0.0)
