@@ -1,4 +1,4 @@
-"""Contacts are where they should be, and readings have the errors of their instrument."""
+"""Contacts are where they should be, and measurements have the errors of their instrument."""
 
 import numpy as np
 import pytest

@@ -508,7 +508,7 @@ def _tabulate_stages(
     if model.measuring is None:
         position, _ = transform_to_base(estimate, observations)
     else:
-        # Readings of other kinds are no positions, so state where the target was.
+        # Measurements of other kinds are no positions, so state where the target was.
         conditions = evaluate_conditions(model, estimate, observations.states)
         position, _ = predict(model, estimate, observations, conditions)
     return tabulate_residuals(

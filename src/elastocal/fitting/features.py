@@ -1,6 +1,6 @@
 """Features of a campaign in a fit: their parameters, and the measurements of all kinds.
 
-A kind evaluates its readings in the frame of the session. Vectors and derivatives are then
+A kind evaluates its measurements in the frame of the session. Vectors and derivatives are then
 turned to base axes, in which the chain of the robot moves.
 """
 
@@ -188,7 +188,7 @@ def evaluate_channels(
 def _evaluate_channel(
     channel: Channel, poses: SessionPoses, numbers: np.ndarray, values: np.ndarray
 ) -> Prediction:
-    """Evaluate the readings of one channel in the axes of the session."""
+    """Evaluate the measurements of one channel in the axes of the session."""
     predicted = channel.kind.evaluate(poses.position, poses.rotation, numbers, values)
     if channel.component is None:
         return predicted

@@ -30,12 +30,12 @@ class Distance(Kind):
     keys: ClassVar = {
         "position_m": "anchor [x, y, z] in the frame of the session, or unknown",
         "std_m": "standard deviation of the stated coordinates, 0.0002 if left out",
-        "zero_m": "reading at no distance: 0 if left out, a number, or unknown",
+        "zero_m": "measurement at no distance: 0 if left out, a number, or unknown",
         "zero_std_m": "standard deviation of the zero, 0 if left out",
     }
 
     def unknowns(self, feature: Feature) -> tuple[Unknown, ...]:
-        """List the coordinates of the anchor and the zero of the readings."""
+        """List the coordinates of the anchor and the zero of the measurements."""
         defaults = {"zero_m": 0.0, "zero_std_m": 0.0}
         completed = Feature(
             feature.name, feature.kind, defaults | {**feature.stated}, feature.source

@@ -15,7 +15,7 @@ class Line(Plane):
     """Coordinate of the target along an axis, m.
 
     It is the height over a plane that is normal to the axis. Only the start differs,
-    because the readings of a gauge differ from each other.
+    because the measurements of a gauge differ from each other.
     """
 
     name = "line"
@@ -23,13 +23,13 @@ class Line(Plane):
     touches = False
     direction_key = "axis"
     keys: ClassVar = {
-        "axis": "[x, y, z] in which the reading grows, roughly, or unknown"
+        "axis": "[x, y, z] in which the measurement grows, roughly, or unknown"
     }
 
     def start(
         self, feature: Feature, position: np.ndarray, numbers: np.ndarray
     ) -> np.ndarray:
-        """Start at the stated axis, or at the gradient of the readings."""
+        """Start at the stated axis, or at the gradient of the measurements."""
         centre = position.mean(axis=0)
         axis = read_direction(feature, self.direction_key)
         if axis is None:

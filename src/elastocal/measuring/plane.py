@@ -1,6 +1,6 @@
 """A tip on a plane: a granite table, a face of a cube, a wall that a probe touches.
 
-The reading is the height of the target over the plane, zero where it touches: the
+The number is the height of the target over the plane, zero where it touches: the
 radius of a touching ball shifts the plane and nothing else.
 """
 

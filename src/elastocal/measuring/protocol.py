@@ -1,6 +1,6 @@
 """What a kind of measurement states, so that everything else treats all kinds alike.
 
-A kind predicts its readings from the pose of a target in the frame of the session and
+A kind predicts its measurements from the pose of a target in the frame of the session and
 from the unknowns of a feature: a place that is touched, a plane, an anchor. The engine
 multiplies the derivative in the pose with the Jacobian of the chain and fits the
 unknowns together with the robot.
@@ -66,7 +66,7 @@ class Feature:
 
 @dataclass(frozen=True)
 class Prediction:
-    """Residuals of M readings of one feature, and derivatives of what is predicted.
+    """Residuals of M measurements of one feature, and derivatives of what is predicted.
 
     Attributes
     ----------
@@ -125,7 +125,7 @@ class Kind:
         rotation: np.ndarray | None,
         options: Mapping[str, Any],
     ) -> tuple[np.ndarray, np.ndarray | None]:
-        """Convert readings (N, 3), (N, 3, 3) to poses of the target in the session."""
+        """Convert measurements (N, 3), (N, 3, 3) to poses of the target in the session."""
         return position, rotation
 
     def unknowns(self, feature: Feature) -> tuple[Unknown, ...]:
@@ -146,7 +146,7 @@ class Kind:
         ----------
         feature : the feature.
         position : (M, 3) array, m, nominal positions of the targets in the session.
-        numbers : (M, r) array, readings.
+        numbers : (M, r) array, measurements.
 
         Returns
         -------
@@ -161,13 +161,13 @@ class Kind:
         numbers: np.ndarray,
         values: np.ndarray,
     ) -> Prediction:
-        """Predict readings from poses and from the values (V,) of their feature.
+        """Predict measurements from poses and from the values (V,) of their feature.
 
         Parameters
         ----------
         position, rotation : (M, 3) and (M, 3, 3) arrays, pose of the target in the
             frame of the session, m.
-        numbers : (M, r) array, readings.
+        numbers : (M, r) array, measurements.
         values : (V,) array.
         """
         raise NotImplementedError
@@ -273,7 +273,7 @@ def span_plane(normal: np.ndarray) -> np.ndarray:
 def predict_along(
     residual: np.ndarray, direction: np.ndarray, by_unknowns: np.ndarray
 ) -> Prediction:
-    """Make the prediction of readings (M,) that grow along directions (M, 3) or (3,) of
+    """Make the prediction of measurements (M,) that grow along directions (M, 3) or (3,) of
     the target's position; derivatives (M, K) in the unknowns."""
     by_pose = np.zeros((len(residual), 1, 6))
     by_pose[:, 0, :3] = direction

@@ -1,6 +1,6 @@
 """A tip on a sphere: a calibration ball that a probe touches.
 
-The reading is the height of the target over the sphere, zero where it touches. The
+The number is the height of the target over the sphere, zero where it touches. The
 radius contains that of the tip.
 """
 
