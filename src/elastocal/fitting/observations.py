@@ -311,12 +311,10 @@ def _average_equal_keys(measurements: Measurements, key: np.ndarray) -> Observat
     if measurements.channel is None:
         return averaged
     first = first_of_pair
-    has_spread = measurements.spread is not None
-    return replace(
-        averaged,
-        channel=measurements.channel[first],
-        spread=measurements.spread[first] if has_spread else None,
-    )
+    averaged = replace(averaged, channel=measurements.channel[first])
+    if measurements.spread is None:
+        return averaged
+    return replace(averaged, spread=measurements.spread[first])
 
 
 def _mean_rotations(

@@ -9,12 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 # Positions (k, 3), m, and rotations (k, 3, 3) of the tool at joint angles (k, n).
 Locate = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+# Heights (k,) or one height, m, of a position (3,) over what is touched.
+Height = Callable[[np.ndarray], Any]
 # Step of numerical derivatives, rad, and largest step of Newton's method, rad.
 _STEP_RAD = 1e-6
 _LARGEST_STEP_RAD = 0.3
@@ -50,7 +53,7 @@ class Workshop:
         position, rotation = self.locate(angles[None])
         return position[0], rotation[0]
 
-    def touch(self, height: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    def touch(self, height: Height) -> np.ndarray:
         """Find joint angles (n,) at which heights (k,) of the tool's position are zero.
 
         Starts are drawn until Newton's method arrives within the joint limits.
@@ -62,9 +65,7 @@ class Workshop:
                 return angles
         raise ValueError("the robot does not reach this contact within its limits")
 
-    def _approach(
-        self, angles: np.ndarray, height: Callable[[np.ndarray], np.ndarray]
-    ) -> np.ndarray | None:
+    def _approach(self, angles: np.ndarray, height: Height) -> np.ndarray | None:
         """Newton's method with steps of least norm; None if it does not arrive."""
         for _ in range(_MOST_STEPS):
             steps = np.vstack([np.zeros(len(angles)), _STEP_RAD * np.eye(len(angles))])
