@@ -38,7 +38,7 @@ def test_the_frame_says_what_is_subtracted(frame, offset_removed, stated):
 
 def test_a_bound_is_stated_if_there_is_one():
     sentence = format_accuracy(ACCURACY)
-    assert "0.100 mm (95 % sure: below 0.150 mm) RMS over some poses (7)" in sentence
+    assert "0.100 mm (95 % bound 0.150 mm) RMS over some poses (7)" in sentence
     assert "0.200 mm at the worst of them" in sentence
 
 

@@ -57,7 +57,7 @@ def test_a_certificate_states_the_errors_of_the_campaign(elastocal, in_checkout)
     assert document["conformity"]["tolerance_m"] == 5e-4
     decision, sentences, _, point, pages, _, following = result.output.splitlines()
     assert document["conformity"]["decision"] in decision and "0.500 mm" in decision
-    assert "Nobody has measured" in sentences
+    assert "has not been measured" in sentences
     assert document["point"] in point and pages.endswith(".pdf")
     assert following.startswith("next: elastocal verify ")
     measured_and_predicted = tabulate_errors(read_verdict(VERDICT))

@@ -16,15 +16,15 @@ from elastocal.report.typesetting import compile_document
         (
             "pass",
             {"risk_above": 0.01},
-            ["larger than the tolerance is 1 %; 5 % are accepted"],
+            ["larger than the tolerance is 1 %; the accepted risk is 5 %"],
         ),
         ("pass", {"risk_above": 0.0001}, ["is below 0.1 %;"]),
         (
             "fail",
             {"risk_above": 0.98},
-            ["larger than the tolerance is 98 %; to fail wrongly"],
+            ["larger than the tolerance is 98 %; the accepted risk of a wrong fail"],
         ),
-        ("undecided", {"risk_above": 0.4}, ["is 40 %: too much to pass"]),
+        ("undecided", {"risk_above": 0.4}, ["is 40 %: too high to pass"]),
         (
             "undecided",
             {"risk_above": 0.01, "shortfalls": ["too few"]},
@@ -43,18 +43,18 @@ def test_decisions_come_with_their_criterion_and_risk(decision, changed, phrases
     for phrase in (
         *phrases,
         criterion,
-        "Nobody has measured the corrected robot",
+        "The corrected robot has not been measured",
         "0.120 mm",
     ):
         assert phrase in text
-    assert ("too much to pass" in text) == (changed["risk_above"] == 0.4)
+    assert ("too high to pass" in text) == (changed["risk_above"] == 0.4)
 
 
 def test_a_correction_that_makes_validation_poses_worse_is_advised_against():
     document = make_document()
     document["validation_rms_m"]["corrected"] = 2e-3
     assert collect_certificate_facts(document)["now"].startswith(
-        "Do not correct the robot by this campaign"
+        "Do not correct the robot with this campaign"
     )
 
 

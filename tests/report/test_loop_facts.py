@@ -51,7 +51,7 @@ WORDS = {
         "a smooth error of unknown cause explains it better than any of 30 candidate "
         "causes"
     ),
-    "not_testable": "show neither that something is missing nor that nothing is",
+    "not_testable": "cannot decide whether a mechanism is missing",
     "fault of the data": "The loads fit as if they were written in kilonewtons.",
 }
 
@@ -88,7 +88,7 @@ def test_the_advice_follows_from_the_verdict_and_the_gain():
         in now(CAMPAIGNS["class"], experiment_rows())[1]
     )
     assert (
-        "trust the correction at poses and loads like these only"
+        "trust the correction only at poses and loads like these"
         in now(CAMPAIGNS["class"])[1]
     )
     assert any(
@@ -98,7 +98,7 @@ def test_the_advice_follows_from_the_verdict_and_the_gain():
     assert "Use the declared model" in now(CAMPAIGNS["adequate"])[0]
     assert "loose target" in now(CAMPAIGNS["unexplained"])[0]
     (advice,) = now(replace(CAMPAIGNS["adequate"], kept="frames"))
-    assert advice.startswith("Leave the robot as its file has it")
+    assert advice.startswith("Do not use this calibration")
 
 
 @pytest.mark.parametrize(
@@ -110,7 +110,7 @@ def test_the_advice_follows_from_the_verdict_and_the_gain():
         ({"cost_m": 1.5e-5, "probability": 0.996}, "0.015 mm: real, negligible"),
         ({"cost_m": 1.5e-5, "probability": 0.7}, "0.015 mm: negligible"),
         ({"cost_m": 4.4e-10, "probability": 0.996}, "below 0.001 mm: real, negligible"),
-        ({"cost_m": None}, "in no command"),
+        ({"cost_m": None}, "cannot be corrected"),
         (
             {"cost_m": None, "name": "setup_step"},
             "an error of the measurement, not of the robot",

@@ -22,7 +22,7 @@ def test_the_outcome_names_reports_and_verdicts(tmp_path):
         lines[name] = describe_outcome(files, tmp_path, "my cells/cell7")
     verdict_line, errors, *following_lines = lines["not_testable"]
     assert verdict_line.startswith(
-        "! cell7: Whatever a mechanism of the catalogue would contribute"
+        "! cell7: At a plausible size, each mechanism of the catalogue"
     )
     assert errors.startswith("  0.171 → ") and errors.endswith(
         " mm (noise 0.050), RMS position error on 10 validation poses"

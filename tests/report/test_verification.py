@@ -30,7 +30,7 @@ def test_without_a_tolerance_nothing_is_certified():
 
 def test_what_remains_starts_another_round():
     facts = collect_verification_facts(make_verification(remains=True))
-    assert "0.080 mm RMS beyond" in facts["remaining"] and "--with" in facts["now"]
+    assert "0.080 mm RMS remains" in facts["remaining"] and "--with" in facts["now"]
     facts = collect_verification_facts(make_verification())
     assert "Nothing repeatable remains" in facts["remaining"]
 
@@ -38,7 +38,7 @@ def test_what_remains_starts_another_round():
 def test_errors_are_stated_with_level_power_and_frame():
     facts = collect_verification_facts(make_verification())
     assert "test at 5 %" in facts["prediction"]
-    assert "0.090 mm RMS in 80 % of cases" in facts["prediction"]
+    assert "0.090 mm RMS is detected in 80 % of cases" in facts["prediction"]
     assert "after the same placement" in facts["prediction"]
     assert "best placement" in facts["whose"] and "target 3" in facts["whose"]
     assert "1 corrected target was not measured" in facts["whose"]

@@ -67,7 +67,7 @@ def _format_bounded(accuracy: Accuracy, error_m: float, bound_m: float | None) -
     if bound_m is None:
         return size
     bound = format_millimetres(bound_m)
-    return f"{size} ({100 * accuracy.confidence:g} % sure: below {bound})"
+    return f"{size} ({100 * accuracy.confidence:g} % bound {bound})"
 
 
 def describe_left_out(verdict: Verdict) -> str:

@@ -73,7 +73,7 @@ def export(
     """Write the calibrated robot: as a robot file, and as the URDF that it came from.
 
     A robot file holds geometry, springs and weights, a URDF the geometry alone. Neither
-    holds other effects or the regression on the remainder: what is lost with them is
+    holds other effects or the regression on the residual: what is lost with them is
     said, and the accuracy stated is without the regression. Of files that exist only
     those are replaced that a command of elastocal has written.
     """
@@ -221,7 +221,7 @@ def _describe_losses(
         )
         size = _format_size(np.linalg.norm(displacements, axis=1))
         warnings.append(
-            f"! no file holds the {remainder.words} on the remainder,"
+            f"! no file holds the {remainder.words} on the residual,"
             f" which elastocal correct adds: {size}"
         )
     if folded.left_out:

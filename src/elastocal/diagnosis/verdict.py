@@ -558,7 +558,8 @@ def describe_repeatable_residual(repeatable: RepeatableResidual | None) -> list[
         return []
     size = f"{1e6 * repeatable.rms_m:.0f} ± {1e6 * repeatable.rms_std_error_m:.0f}"
     return [
-        f"{size} µm RMS of what is left are a function of the joint angles and have no name"
+        f"a repeatable error of {size} µm RMS remains: it depends on the joint angles, "
+        "and no mechanism of the catalogue explains it"
     ]
 
 

@@ -27,8 +27,8 @@ _SHARES = {
     "before": "before calibration, as measured at validation poses",
     "form of the model": "form of the model",
     "not commanded": "effects that no command contains",
-    "regression": "regression on the remainder",
-    "left by the regression": "left by the regression on the remainder",
+    "regression": "regression on the residual",
+    "left by the regression": "residual of the regression",
 }
 # A smaller contribution is printed as below this length, which no tracker resolves.
 _SMALLEST_SHOWN_M = 1e-7

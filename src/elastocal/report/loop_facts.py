@@ -223,7 +223,7 @@ def format_cost(effect: Effect, heldout: HeldOut) -> str:
     if cost_m is None:
         definition = list_effects().get(effect.name)
         if definition is None or definition.moves_robot:
-            return "in no command"
+            return "cannot be corrected"
         return "an error of the measurement, not of the robot"
     if cost_m > NEGLIGIBLE * heldout.after.rms_m:
         return f"{say.format_millimetres(cost_m)} mm"

@@ -83,7 +83,7 @@ def draw_targets(summary: pd.DataFrame) -> Figure:
     heights = [max(table.quantity.nunique(), 1) for table in (shares, ratios)]
     figure, axes = create_panels(2, 1, 32 + 7.4 * sum(heights), height_ratios=heights)
     _draw_intervals(axes[0, 0], shares, lambda share: _PER_CENT * share)
-    axes[0, 0].set(xlim=(-2, 102), xlabel="share of cases (%)")
+    axes[0, 0].set(xlim=(-2, 102), xlabel="share (%)")
     _draw_intervals(axes[1, 0], ratios, lambda ratio: _PER_CENT * (ratio - 1.0))
     excess = _PER_CENT * (ratios[["rate", "low", "high"]].to_numpy(float) - 1.0)
     limit = 1.1 * np.nanmax(np.abs(excess), initial=6.0)
