@@ -2,6 +2,7 @@
 measurements fit, and nowhere else."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,13 +14,18 @@ from made_campaigns import (
 )
 from scipy.spatial.transform import Rotation
 
+from elastocal.campaigns.campaign_folder import read_campaign_folder
+from elastocal.campaigns.reading import read_campaign
 from elastocal.data_checks.hypotheses import (
     find_better_interpretation,
     list_discrete_hypotheses,
     list_fitted_hypotheses,
     list_row_shifts,
 )
+from elastocal.data_checks.placement import place_measurements
 from elastocal.mechanics.kinematics import compute_poses
+
+BOX = Path(__file__).resolve().parents[2] / "data" / "measured"
 
 
 def softer_by_chance(robot, tracker):
@@ -399,3 +405,79 @@ def test_measured_columns_of_each_target_or_pose_moved_by_one_are_named(
     # Of two loads of a pose each second row is of the next pose: both words say so.
     assert fault.name == "shuffled_rows"
     assert fault.detail.endswith("up" if steps > 0 else "down")
+
+
+@pytest.fixture(scope="module")
+def before_a_board():
+    """The measured campaign of a camera on a robot, before a board."""
+    folder = read_campaign_folder(
+        BOX / "fr3_board", BOX.parents[1] / "config" / "robots"
+    )
+    return read_campaign(folder)
+
+
+def invert(measurements):
+    """Poses of the board in the camera, in place of the camera in the board."""
+    inverse = Rotation.from_rotvec(measurements.rotation_vector).inv()
+    return {
+        "position": -inverse.apply(measurements.position),
+        "rotation_vector": inverse.as_rotvec(),
+    }
+
+
+def mirror(measurements):
+    """A board whose z axis points the other way in positions and rotations."""
+    return {
+        "position": measurements.position * [1, 1, -1],
+        "rotation_vector": measurements.rotation_vector * [-1, -1, 1],
+    }
+
+
+@pytest.mark.parametrize(
+    ("change", "name", "phrase"),
+    [
+        (lambda rows: {"position": 1000 * rows.position}, "wrong_unit", "millimetres"),
+        (lambda rows: {"position": 1.2 * rows.position}, "wrong_scale", "0.8311 times"),
+        (lambda rows: {"position": rows.position / 2}, "wrong_scale", "1.995 times"),
+        (invert, "inverse_transform", "the board in the camera"),
+        (mirror, "swapped_axes", "z = -z"),
+    ],
+    ids=["mm for m", "squares of another size", "half", "inverse", "mirrored"],
+)
+def test_faults_of_a_camera_before_a_board_are_named(
+    before_a_board, change, name, phrase
+):
+    columns = change(before_a_board.measurements)
+    (fault,) = find_better_interpretation(
+        replace_measured_columns(before_a_board, **columns)
+    )
+    assert fault.name == name
+    assert phrase in fault.detail
+    assert fault.evidence[1] < fault.evidence[0] / 2
+
+
+def test_a_camera_before_a_board_has_no_fault_and_small_scales_are_left_to_physics(
+    before_a_board,
+):
+    assert find_better_interpretation(before_a_board) == []
+    position = 1.04 * before_a_board.measurements.position
+    scaled = replace_measured_columns(before_a_board, position=position)
+    assert find_better_interpretation(scaled) == []
+
+
+def test_the_link_frame_of_a_camera_is_told_from_its_optical_frame(before_a_board):
+    estimate = place_measurements(before_a_board).estimate
+    mount = Rotation.from_matrix(estimate.target_rotation[0]).as_rotvec()
+    target = replace(
+        before_a_board.targets[0],
+        rotation=tuple(mount),
+        offset_m=tuple(estimate.target_offset[0]),
+    )
+    stated = replace(before_a_board, targets=(target,))
+    assert find_better_interpretation(stated) == []
+    optical = Rotation.from_rotvec(stated.measurements.rotation_vector)
+    link = optical * Rotation.from_matrix([[0, 0, 1], [-1, 0, 0], [0, -1, 0]])
+    (fault,) = find_better_interpretation(
+        replace_measured_columns(stated, rotation_vector=link.as_rotvec())
+    )
+    assert "optical frame (z forward, x right) and its link frame" in fault.detail
