@@ -16,11 +16,12 @@ alone decide.
 Poses that are left out one at a time have neighbours among the fitted ones, and
 whatever neighbours have in common passes for prediction. Of many poses, groups of
 neighbours are therefore left out together [2]_; but groups that are far larger than the
-distance of new poses from the fitted ones measure extrapolation [6]_. This choice is made inside the training poses, and
-the held-out poses judge its result (nested validation [3]_). The model without effects
-is the one that would be kept, under the noise that it leaves. No estimate of the
-variance of cross-validated errors is unbiased [4]_. Groups have less in common than
-poses, so that their spread is used, with Student's t as the density of their mean.
+distance of new poses from the fitted ones measure extrapolation [6]_. This choice is
+made inside the training poses, and the held-out poses judge its result (nested
+validation [3]_). The model without effects is the one that would be kept, under the
+noise that it leaves. No estimate of the variance of cross-validated errors is unbiased
+[4]_. Groups have less in common than poses, so that their spread is used, with
+Student's t as the density of their mean.
 
 References
 ----------
