@@ -30,20 +30,27 @@ def test_a_terminal_that_lacks_a_character_gets_a_question_mark(tmp_path):
     assert b"Zelle-?" in finished.stderr and b"Traceback" not in finished.stderr
 
 
-@pytest.mark.parametrize("delay_s", [0.15, 0.4, 1.0])
+@pytest.mark.parametrize("delay_s", [0.0, 0.15, 0.4, 1.0])
 def test_an_interrupt_ends_without_a_traceback(tmp_path, delay_s):
-    """Also during the imports, which take most of the first second."""
+    """During the imports, which take most of the first second, and after them. The delay
+    counts from the first import behind the handler: before it Python itself starts, for
+    as long as the load of the machine makes it."""
     with subprocess.Popen(
-        [*COMMAND, "demo"],
+        [sys.executable, "-X", "importtime", *COMMAND[1:], "demo"],
         cwd=tmp_path,
         stderr=subprocess.PIPE,
         stdout=subprocess.PIPE,
+        bufsize=0,
         preexec_fn=heed_interrupts,
     ) as process:
+        while not process.stderr.readline().rstrip().endswith(b" elastocal.command"):
+            assert process.poll() is None
         time.sleep(delay_s)
         process.send_signal(signal.SIGINT)
         output, errors = process.communicate(timeout=60)
-    assert process.returncode not in (0, 1)
+    # Python dies of the signal itself, which a shell calls 130 too, if the interrupt has
+    # passed a call of `exec`, such as those of data classes during imports.
+    assert process.returncode in (130, -signal.SIGINT)
     assert b"Traceback" not in output + errors
 
 

@@ -1,11 +1,12 @@
 """The command `elastocal`, and `python -m elastocal`: prepare the process, then run the
 application.
 
-Only the standard library is imported here. So the threads of numerical libraries are
-limited before they start, and an interrupt during the imports ends without a traceback.
+Only small modules of the standard library are imported here, those that Python itself has
+imported by then. So the threads of numerical libraries are limited before they start, and
+an interrupt during the imports ends without a traceback. Nothing can be done about one
+before Python begins with this module.
 """
 
-import ctypes
 import os
 import signal
 import sys
@@ -57,6 +58,9 @@ def main() -> None:
 def prepare_process() -> None:
     """Limit threads to one, keep memory for the next array, and print on terminals that
     lack a character a question mark instead of failing."""
+    # Import it only here, because its import takes long enough to be interrupted.
+    import ctypes
+
     for variable in _THREAD_VARIABLES:
         os.environ.setdefault(variable, "1")
     # Other systems than Linux have no mallopt, and no need of it.
