@@ -8,13 +8,16 @@ from made_calibrated import USUAL, make_calibrated_robot
 from made_folders import make_folder, make_table
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi, norm
+from support import robot_of
 from synthetic import make_states
 
 from elastocal.application.accuracy import (
+    compute_determined_covariance,
     compute_length_quantiles,
     compute_uncorrected_errors,
     inflate_to_held_out_errors,
     predict_campaign_accuracy,
+    predict_determined_rms_m,
     predict_errors,
 )
 from elastocal.application.calibrated import predict_poses
@@ -23,8 +26,9 @@ from elastocal.application.scope import calibrate_on_case, determine_scope
 from elastocal.application.statements import format_accuracy
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import apply_step
-from elastocal.fitting.noise import Noise
+from elastocal.fitting.noise import Noise, set_prior_std
 from elastocal.loop.whole import read_cases
+from elastocal.validation.conformity import decide_conformity
 from elastocal.validation.held_out import compute_position_residuals
 from elastocal.validation.transfer import transfer_fit
 
@@ -186,3 +190,69 @@ def test_the_uncertain_form_of_the_model_is_in_every_figure(fanuc):
     assert min(accuracy.rms_bound_m, accuracy.worst_m) > 1e-3
     assert (prediction.bound_m > 1e-3).all()
     assert "1.000 mm" in format_accuracy(accuracy)
+
+
+PRIOR_RAD = 1e-3
+
+
+def calibrate_one_joint(variance_left):
+    """A joint with an arm of one metre, whose offset is known to a share of the variance
+    of its prior."""
+    calibrated = make_calibrated_robot(
+        robot_of("Rz(q1) Tx(1) [A]"), "joint_offset@1", identified=False
+    )
+    (effect,) = calibrated.model.effects
+    effect = set_prior_std(effect, np.array([PRIOR_RAD]))
+    return replace(
+        calibrated,
+        model=replace(calibrated.model, effects=(effect,)),
+        covariance=np.array([[variance_left * PRIOR_RAD**2]]),
+    )
+
+
+@pytest.mark.parametrize(
+    ("variance_left", "expected"),
+    [(1.0, "undecided"), (0.9, "undecided"), (0.1, "fail")],
+)
+def test_a_robot_fails_by_measurements_and_not_by_a_prior(variance_left, expected):
+    """The error is the normally distributed offset times a metre. It is above a hundredth
+    of its standard deviation with 99.2 % probability, whether a prior or measurements
+    say so."""
+    calibrated = calibrate_one_joint(variance_left)
+    std_m = np.sqrt(variance_left) * PRIOR_RAD
+    commands = np.linspace(-1.0, 1.0, 5)[:, None], np.zeros((5, 6))
+    rms_m = predict_errors(calibrated, *commands).rms_m
+    tolerance_m = 0.01 * std_m
+    probability = 2.0 * norm.sf(0.01)
+    assert (rms_m > tolerance_m).mean() == pytest.approx(probability, abs=0.01)
+    decided = decide_conformity(
+        rms_m, tolerance_m, 0.05, predict_determined_rms_m(calibrated, *commands)
+    )
+    assert decided.decision == expected
+    # The bound still contains the prior: such a robot does not pass.
+    assert decided.limit_m == pytest.approx(1.96 * std_m, rel=0.05)
+
+
+def test_only_directions_that_the_measurements_leave_to_the_priors_are_fixed(fanuc):
+    """Two parameters whose sum is measured: their difference is as the priors have it.
+    A third one without a prior stays as it is, less what the difference says of it."""
+    keys = ("joint_offset@2", "joint_offset@3", "joint_offset@4")
+    robot = replace(fanuc, masses=())
+    calibrated = make_calibrated_robot(robot, *keys, identified=False)
+    first, second, third = calibrated.model.effects
+    effects = [set_prior_std(effect, np.array([2e-3])) for effect in (first, second)]
+    model = replace(calibrated.model, effects=(*effects, third))
+    # Standard deviations of sum and difference (each over the root of two), and of the
+    # third parameter, which goes with the difference.
+    root = np.array(
+        [
+            [2e-5, 2e-3, 0.0],
+            [2e-5, -2e-3, 0.0],
+            [0.0, 3e-4, 4e-4],
+        ]
+    )
+    root[:2] /= np.sqrt(2.0)
+    calibrated = replace(calibrated, model=model, covariance=root @ root.T)
+    expected = root[:, [0, 2]] @ root[:, [0, 2]].T
+    determined = compute_determined_covariance(calibrated)
+    np.testing.assert_allclose(determined, expected, atol=1e-12)

@@ -39,6 +39,8 @@ from elastocal.application.frames import (
     root_mean_square,
 )
 from elastocal.application.scope import set_form_error
+from elastocal.fitting.least_squares import IDENTIFIED_SHARE
+from elastocal.fitting.model import list_parameters
 from elastocal.mechanics.kinematics import compute_jacobians
 from elastocal.verdict import Accuracy
 
@@ -186,6 +188,45 @@ def predict_errors(
         ),
         scope=scope,
     )
+
+
+def predict_determined_rms_m(
+    calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray
+) -> np.ndarray:
+    """Predict the RMS errors over commands of simulated robots, (draws,), as if all that
+    the measurements do not determine were as estimated.
+
+    Arguments as in `predict_errors`.
+    """
+    determined = replace(
+        calibrated, covariance=compute_determined_covariance(calibrated)
+    )
+    return predict_errors(determined, reported_angles, wrench).rms_m
+
+
+def compute_determined_covariance(calibrated: CalibratedRobot) -> np.ndarray:
+    """Compute the covariance (P, P) of the parameters given those directions of the
+    parameters of which their priors say more than the measurements.
+
+    The directions are the principal axes of the covariance in units of the priors [1]
+    along which more than `IDENTIFIED_SHARE` of the prior variance is left.
+
+    References
+    ----------
+    .. [1] Spantini, A. et al., Optimal low-rank approximations of Bayesian linear inverse
+       problems, SIAM Journal on Scientific Computing 37, 2015.
+    """
+    covariance = calibrated.covariance
+    parameters = list_parameters(calibrated.model, calibrated.estimate)
+    prior_std = np.array([parameter.prior_std or 0.0 for _, parameter in parameters])
+    has_prior = prior_std > 0.0
+    # Functionals (K, P) of the parameters that are uncorrelated in prior units.
+    functionals = np.diag(1.0 / np.where(has_prior, prior_std, 1.0))[has_prior]
+    shares, axes = np.linalg.eigh(functionals @ covariance @ functionals.T)
+    undetermined = shares > IDENTIFIED_SHARE
+    directions = axes[:, undetermined].T @ functionals
+    gains = covariance @ directions.T / shares[undetermined]
+    return np.asarray(covariance - gains @ (directions @ covariance))
 
 
 @dataclass(frozen=True)

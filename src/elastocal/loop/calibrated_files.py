@@ -14,6 +14,7 @@ import numpy as np
 from elastocal import __version__
 from elastocal.application.accuracy import (
     REGION,
+    predict_determined_rms_m,
     predict_errors,
     select_campaign_commands,
 )
@@ -293,8 +294,7 @@ def decide_on_campaign(
     tolerance_m: float,
     accepted_risk: float,
 ) -> tuple[Conformity, list[str]]:
-    """Decide whether a corrected robot keeps a tolerance over its campaign, as
-    `decide_by_prediction`.
+    """Decide whether a corrected robot keeps a tolerance over its campaign.
 
     Parameters
     ----------
@@ -304,29 +304,6 @@ def decide_on_campaign(
         Tells how many configurations judge it.
     prediction : ErrorPrediction
         Errors at the poses and loads of the campaign.
-    tolerance_m, accepted_risk : float
-        As in `decide_by_prediction`.
-    """
-    shortfalls = list_shortfalls(
-        verdict.heldout.configurations, calibrated.states, calibrated.robot
-    )
-    return decide_by_prediction(prediction, shortfalls, tolerance_m, accepted_risk)
-
-
-def decide_by_prediction(
-    prediction: ErrorPrediction,
-    shortfalls: list[str],
-    tolerance_m: float,
-    accepted_risk: float,
-) -> tuple[Conformity, list[str]]:
-    """Decide whether a corrected robot keeps a tolerance, by its predicted errors.
-
-    Parameters
-    ----------
-    prediction : ErrorPrediction
-        Errors at the poses and loads of the campaign.
-    shortfalls : list of str
-        Reasons why the validation says too little, see `list_shortfalls`.
     tolerance_m : float
         Largest allowed RMS position error, m.
     accepted_risk : float
@@ -337,9 +314,18 @@ def decide_by_prediction(
     decision : Conformity
         Undecided instead of a pass if there is any shortfall.
     shortfalls : list of str
-        With the missing fit, if nothing was fitted.
+        Reasons why the validation says too little, with the missing fit if nothing was
+        fitted.
     """
-    decision = decide_conformity(prediction.rms_m, tolerance_m, accepted_risk)
+    shortfalls = list_shortfalls(
+        verdict.heldout.configurations, calibrated.states, calibrated.robot
+    )
+    determined_rms_m = predict_determined_rms_m(
+        calibrated, *select_campaign_commands(calibrated)
+    )
+    decision = decide_conformity(
+        prediction.rms_m, tolerance_m, accepted_risk, determined_rms_m
+    )
     if not prediction.summarize(REGION).fitted:
         sentence = "nothing fitted: no error is predicted for a robot without fitted parameters"
         shortfalls = [sentence, *shortfalls]

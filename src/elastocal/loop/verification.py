@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal import __version__
+from elastocal.application.accuracy import predict_determined_rms_m
 from elastocal.application.frames import ROBOT, root_mean_square
 from elastocal.application.verification import (
     CommandedTargets,
@@ -198,7 +199,13 @@ def _certify(
     shortfalls = list_verification_shortfalls(comparison.targets, comparison.errors)
     if shortfalls and measured.decision == PASS:
         measured = replace(measured, decision=UNDECIDED)
-    predicted = decide_conformity(comparison.now.rms_m, tolerance_m, accepted_risk)
+    commands = comparison.targets.joint_angles, comparison.targets.wrench
+    predicted = decide_conformity(
+        comparison.now.rms_m,
+        tolerance_m,
+        accepted_risk,
+        predict_determined_rms_m(comparison.calibrated, *commands),
+    )
     return {
         "predicted": asdict(predicted),
         "measured": asdict(measured),

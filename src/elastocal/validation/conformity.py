@@ -105,13 +105,18 @@ class Conformity:
 
 
 def decide_conformity(
-    rms_m: np.ndarray, tolerance_m: float, accepted_risk: float
+    rms_m: np.ndarray,
+    tolerance_m: float,
+    accepted_risk: float,
+    determined_rms_m: np.ndarray | None = None,
 ) -> Conformity:
     """Decide whether a robot keeps a tolerance.
 
     It passes if the risk that its RMS exceeds the tolerance is at most the accepted
     one, fails if the risk that it does not is at most that, and is otherwise undecided:
-    acceptance and rejection with guard bands (JCGM 106:2012, 8.3).
+    acceptance and rejection with guard bands (JCGM 106:2012, 8.3). A robot fails by
+    measurements alone: if it is only a prior that makes its error large, nothing is
+    known against it, and it is undecided.
 
     Parameters
     ----------
@@ -120,15 +125,25 @@ def decide_conformity(
         possible.
     tolerance_m : float
     accepted_risk : float
+    determined_rms_m : (draws,) array, optional
+        The same of robots whose undetermined parameters are as estimated, see
+        `accuracy.predict_determined_rms_m`; by default the measurements determine all.
     """
-    # Count one more draw on each side, so that no finite number of draws gives
-    # certainty.
-    risk = float((1.0 + (rms_m > tolerance_m).sum()) / (2.0 + len(rms_m)))
+    risk = _compute_risk(rms_m, tolerance_m)
+    determined_risk = risk
+    if determined_rms_m is not None:
+        determined_risk = _compute_risk(determined_rms_m, tolerance_m)
     if risk <= accepted_risk:
         decision = PASS
-    elif risk >= 1.0 - accepted_risk:
+    elif min(risk, determined_risk) >= 1.0 - accepted_risk:
         decision = FAIL
     else:
         decision = UNDECIDED
     limit_m = float(np.quantile(rms_m, 1.0 - accepted_risk))
     return Conformity(decision, tolerance_m, limit_m, risk, accepted_risk)
+
+
+def _compute_risk(rms_m: np.ndarray, tolerance_m: float) -> float:
+    """Compute the share of draws above a tolerance. One more draw counts on each side,
+    so that no finite number of draws gives certainty."""
+    return float((1.0 + (rms_m > tolerance_m).sum()) / (2.0 + len(rms_m)))
