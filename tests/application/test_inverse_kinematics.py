@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from analysed_robots import analysed
 from made_chains import perturb_axes
+from made_urdf import write_linkage
 from scipy.interpolate import PchipInterpolator
 
 from elastocal.application import inverse_kinematics
@@ -16,6 +17,7 @@ from elastocal.application.inverse_kinematics import (
     find_beyond_limits,
     solve_path,
 )
+from elastocal.exchange.urdf import robot_from_urdf
 from elastocal.mechanics.kinematics import compute_poses
 
 # Angles from the middle of the limits to a posture that is not singular.
@@ -41,6 +43,21 @@ def test_a_path_about_the_base_has_no_large_step_if_a_turn_is_within_the_limits(
     )
     motion = np.degrees(np.abs(np.diff(path, axis=0)).sum())
     assert motion == pytest.approx(12.0, abs=1e-3)
+
+
+def test_a_path_of_a_robot_with_a_joint_that_follows_needs_only_commands(tmp_path):
+    """Joint angles of the path are those of commands, and the path is as smooth as the
+    one from which its poses are."""
+    robot = robot_from_urdf(write_linkage(tmp_path), "base", "tool").robot
+    share = np.linspace(0.0, 1.0, 30)[:, None]
+    commands = 0.3 + share * np.array([0.3, 0.4, -0.5, 0.3, 0.2, 0.6])
+    angles = robot.model_angles(commands)
+    wanted = compute_poses(robot.chain, angles, robot.chain.end_effector)
+    path, error_m = solve_path(robot, *wanted)
+    assert error_m.max() < SOLVED_M and not find_beyond_limits(robot, path).any()
+    by_commands = robot.model_angles(robot.reported_angles(path))
+    np.testing.assert_allclose(path, by_commands, atol=1e-12)
+    assert np.abs(np.diff(path, axis=0)).max() < 0.05
 
 
 def compute_motion_cost(step, allowed):

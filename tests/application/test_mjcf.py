@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from analysed_robots import analysed
 from made_loop_tables import CAMPAIGNS
-from made_models import calibrate_exactly, make_calibrated
+from made_models import FOLLOWING, calibrate_exactly, equip, make_calibrated
 from synthetic import make_states
 
 from elastocal.application.calibrated import predict_poses
@@ -88,6 +88,18 @@ def test_effects_that_no_spring_has_are_named():
     assert "declared_weight" not in exported.left_out
     assert {"lost_motion@1", "stiffening@1[two slopes]"} & {*exported.left_out}
     assert any(key.startswith("transmission_harmonic") for key in exported.left_out)
+
+
+def test_joints_that_follow_are_named_beside_their_servos():
+    """The constraint is not active: the joint yields by a spring of its own."""
+    contents = describe(calibrate_exactly(equip(FOLLOWING)))
+    model = mujoco.MjModel.from_xml_string(build_mjcf(contents).text)
+    assert (model.nu, model.neq) == (7, 1) and not model.eq_active0[0]
+    assert (model.eq_obj1id[0], model.eq_obj2id[0]) == (2, 1)
+    robot = equip(FOLLOWING)
+    offset, multiplier = model.eq_data[0, :2]
+    angles = robot.model_angles(np.linspace(-0.5, 0.4, robot.commands))
+    assert angles[2] == pytest.approx(multiplier * angles[1] + offset)
 
 
 def test_servos_have_the_stiffness_of_the_gears_and_the_names_of_the_joints():

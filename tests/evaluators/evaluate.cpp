@@ -57,7 +57,7 @@ int main(int, char** arguments) {
     const std::string what(arguments[3]);
     const auto model = elastocal::Model::load(arguments[1], std::strcmp(arguments[2], "0") != 0);
     elastocal::Workspace workspace(model);
-    const std::size_t joints = model.joints();
+    const std::size_t joints = model.commands();
     const bool corrects = what == "correct" || what == "time";
     // Command or start, wrench, and the wanted pose of a correction.
     const std::size_t width = joints + 6 + (corrects ? 12 : 0);

@@ -7,7 +7,13 @@ import sys
 
 import numpy as np
 import pytest
-from made_models import ROBOTS, draw_commands, make_calibrated, write_made_model
+from made_models import (
+    FOLLOWING,
+    ROBOTS,
+    draw_commands,
+    make_calibrated,
+    write_made_model,
+)
 
 from elastocal.application.calibrated import (
     compute_nominal_poses,
@@ -54,7 +60,7 @@ def test_regressions_are_those_of_the_package(regression, tmp_path):
     assert moved[is_added].all()
 
 
-@pytest.mark.parametrize("name", ["kuka", "gen3"])
+@pytest.mark.parametrize("name", ["kuka", "gen3", FOLLOWING])
 def test_corrected_commands_reach_the_wanted_poses_by_the_package(name, tmp_path):
     calibrated = make_calibrated(name)
     path = write_made_model(tmp_path / "arm.json", calibrated)

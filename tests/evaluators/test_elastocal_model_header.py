@@ -9,7 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_models import ROBOTS, draw_commands, make_calibrated, write_made_model
+from made_models import (
+    FOLLOWING,
+    ROBOTS,
+    draw_commands,
+    make_calibrated,
+    write_made_model,
+)
 from selected import slow_but
 
 from elastocal import evaluators
@@ -85,7 +91,7 @@ def test_regressions_are_those_of_the_package(program, regression, tmp_path):
     assert np.abs(physics[:, :3] - position).max() > 1e-5
 
 
-@pytest.mark.parametrize("name", slow_but(["ur10"], ROBOTS))
+@pytest.mark.parametrize("name", slow_but(["ur10", FOLLOWING], ROBOTS))
 def test_corrected_commands_reach_the_wanted_poses_by_the_package(
     program, name, tmp_path
 ):
@@ -100,7 +106,7 @@ def test_corrected_commands_reach_the_wanted_poses_by_the_package(
     rigid = program(path, "rigid", commands, wrench)
     np.testing.assert_allclose(rigid[:, :3], position, atol=1e-9, rtol=0.0)
     rows = program(path, "correct", by_package.uncorrected, wrench, position, rotation)
-    corrected = rows[:, : calibrated.robot.joints]
+    corrected = rows[:, : calibrated.robot.commands]
     assert rows[usable, -1].all()
     reached, turned = predict_poses(calibrated, corrected, wrench)
     np.testing.assert_allclose(reached[usable], position[usable], atol=1e-9, rtol=0.0)

@@ -6,7 +6,17 @@ import re
 import numpy as np
 import pytest
 import yaml
-from made_urdf import Pinocchio, assert_same_poses, joint, link, robot, written
+from made_urdf import (
+    LINKAGE_COMMANDS,
+    LINKAGE_JOINTS,
+    Pinocchio,
+    assert_same_poses,
+    joint,
+    link,
+    robot,
+    write_linkage,
+    written,
+)
 from support import refused
 from synthetic import make_states
 
@@ -176,8 +186,28 @@ def one_joint(*names, **more):
         (
             (*map(link, "ab"), joint("j", "a", "b", mimic=("x", 1.0, 0.0))),
             ("a", "b"),
-            "joint 'j'",
-            ["mimics"],
+            "joint 'j': mimic",
+            ["'x'", "a joint of this file that moves: j"],
+        ),
+        (
+            (
+                *map(link, "abc"),
+                joint("j", "a", "b", mimic=("k", 1.0, 0.0)),
+                joint("k", "b", "c", mimic=("j", 1.0, 0.0)),
+            ),
+            ("a", "c"),
+            "joint 'k': mimic",
+            ["follow each other"],
+        ),
+        (
+            (
+                *map(link, "abc"),
+                joint("j", "a", "b", mimic=("k", 0.0, 0.0)),
+                joint("k", "b", "c"),
+            ),
+            ("a", "c"),
+            "joint 'j': mimic multiplier",
+            ["fixed"],
         ),
         (one_joint("a", "b c", "b_c"), ("a", "b_c", ["b c"]), "point", ["blanks"]),
         (
@@ -192,6 +222,42 @@ def test_links_that_make_no_chain_are_refused(tmp_path, parts, links, key, fragm
     path = written(tmp_path, *parts)
     with refused(path, key, *fragments):
         robot_from_urdf(path, *links)
+
+
+def test_poses_of_a_chain_with_a_joint_that_follows_agree_with_pinocchio(tmp_path):
+    path = write_linkage(tmp_path)
+    result = robot_from_urdf(path, "base", "tool")
+    arm = through_its_file(result)
+    assert (arm.joints, arm.commands) == (7, 6)
+    assert arm.joint_names == LINKAGE_JOINTS and arm.command_names == LINKAGE_COMMANDS
+    assert_same_poses(arm, path, "base", "tool", count=200, within=1e-12, mimic=True)
+    (note,) = [note for note in result.notes if "follows" in note]
+    assert "'linkage' follows 'j2'" in note and "q4 of 'j4'" in note
+
+
+def test_joints_may_follow_a_joint_that_follows_and_one_beside_the_chain(tmp_path):
+    """The chain's first joint is commanded by way of another, and the last by a joint of
+    a side branch."""
+    path = written(
+        tmp_path,
+        *map(link, "abcdx"),
+        joint("j1", "a", "b", xyz=(0, 0, 0.3), mimic=("j2", 2.0, -0.1)),
+        joint("j2", "b", "c", xyz=(0.2, 0, 0), axis=(0, 1, 0), mimic=("j3", -0.5, 0.2)),
+        joint("j3", "c", "d", "prismatic", xyz=(0.1, 0, 0)),
+        joint("side", "a", "x"),
+        joint(
+            "j4", "d", "e", xyz=(0.1, 0, 0), axis=(1, 0, 0), mimic=("side", 1.5, 0.3)
+        ),
+        link("e"),
+    )
+    arm = through_its_file(robot_from_urdf(path, "a", "e"))
+    assert arm.command_names == ("j3", "side")
+
+    def follow(values):
+        j2 = -0.5 * values["j3"] + 0.2
+        return {"j2": j2, "j1": 2.0 * j2 - 0.1, "j4": 1.5 * values["side"] + 0.3}
+
+    assert_same_poses(arm, path, "a", "e", follow, within=1e-12)
 
 
 SOUND = (link("a"), link("b"), joint("j", "a", "b"))

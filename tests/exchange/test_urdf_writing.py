@@ -10,7 +10,15 @@ from analysed_robots import analysed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_calibrated import make_calibrated_robot
-from made_urdf import assert_same_poses, joint, link, segments, written
+from made_urdf import (
+    Pinocchio,
+    assert_same_poses,
+    joint,
+    link,
+    segments,
+    write_linkage,
+    written,
+)
 from support import refused
 
 from elastocal.application.exported import fold_effects
@@ -117,6 +125,35 @@ def test_the_file_of_another_robot_is_refused(cell, old, new, fragments):
     )
     with refused(other_path, fragments, "imported"):
         write_calibrated_origins(other_path, robot, calibrated)
+
+
+def test_a_joint_that_follows_still_does_in_the_calibrated_file(tmp_path):
+    path = write_linkage(tmp_path)
+    robot = robot_from_urdf(path, "base", "tool").robot
+    calibrated = calibrated_of(robot)
+    output, _ = export_arm(path, robot, calibrated)
+    mimic = '<mimic joint="j2" multiplier="-1.0" offset="0.1"'
+    assert mimic in output.read_text("utf-8")
+    assert_same_poses(calibrated, output, "base", "tool", mimic=True)
+
+
+def test_a_new_urdf_lets_a_joint_follow(tmp_path):
+    nominal = robot_from_urdf(write_linkage(tmp_path), "base", "tool").robot
+    calibrated = calibrated_of(nominal)
+    path = tmp_path / "new.urdf"
+    path.write_text(build_urdf(nominal, calibrated), "utf-8")
+    assert '<mimic joint="j2"' in path.read_text("utf-8")
+    by_pinocchio = Pinocchio(path, mimic=True)
+    commands = np.random.default_rng(2).uniform(-1.0, 1.0, (5, nominal.commands))
+    expected, _ = compute_poses(
+        calibrated.chain,
+        calibrated.model_angles(commands),
+        calibrated.chain.end_effector,
+    )
+    for command, position in zip(commands, expected, strict=True):
+        values = dict(zip(nominal.command_names, command, strict=True))
+        reached, _ = by_pinocchio.pose("base_link", "tool", values)
+        np.testing.assert_allclose(reached, position, atol=1e-9)
 
 
 @settings(max_examples=10, deadline=None)

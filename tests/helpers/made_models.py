@@ -24,7 +24,9 @@ from elastocal.mechanics.sites import build_sites
 from elastocal.residual_model.selection import fit_to_observations, is_commanded
 from elastocal.verdict import CrossValidatedGain, RegressionChoice, Spread
 
-ROBOTS = ("kuka", "fanuc", "ur10", "iiwa14", "gen3")
+# A robot of seven joints of which one follows another: six angles command it.
+FOLLOWING = "iiwa14, of which one joint follows another"
+ROBOTS = ("kuka", "fanuc", "ur10", "iiwa14", "gen3", FOLLOWING)
 # The robot whose base is declared; the others have fitted frames.
 DECLARED_BASE = "gen3"
 # A regression of each kind on the residuals, and its setting.
@@ -40,9 +42,12 @@ STATES = 60
 def equip(name):
     """Read a robot; give it a compensator and a gear ratio, so that every effect has
     candidates, and joint angles that its controller reports otherwise."""
-    robot = analysed(name)
+    robot = analysed(name.partition(",")[0])
     matrix = np.eye(robot.joints)
     matrix[2, 1] = 1.0
+    if name == FOLLOWING:
+        matrix[2, 1] = -0.5
+        matrix = np.delete(matrix, 2, axis=1)
     return replace(
         robot,
         joint_limits=np.tile([-9.0, 9.0], (robot.joints, 1)),
@@ -77,6 +82,13 @@ def make_choice(regression):
     return RegressionChoice(regression, regression, 1, setting, spread, gain)
 
 
+def make_reachable_states(robot, count, seed, **draws):
+    """Make states whose joint angles a command can bring about together."""
+    states = make_states(robot.joints, count, seed, **draws)
+    commands = robot.reported_angles(states.joint_angles)
+    return replace(states, joint_angles=robot.model_angles(commands))
+
+
 @cache
 def make_calibrated(name, regression="", seed=3):
     """Make a calibrated robot with a regression on its residuals, if one is named."""
@@ -92,7 +104,7 @@ def make_calibrated(name, regression="", seed=3):
         base_std_m=2e-4 * (name == DECLARED_BASE),
     )
     estimate = make_estimate(model, seed=seed, size=0.2)
-    states = make_states(robot.joints, STATES, seed, force=100.0, span=1.5)
+    states = make_reachable_states(robot, STATES, seed, force=100.0, span=1.5)
     observations = observe_exactly(model, estimate, states)
     wrong = 2e-4 * np.sin(states.joint_angles[:, :3] + states.joint_angles[:, 1:4])
     observations = replace(observations, position=observations.position + wrong)
@@ -111,7 +123,7 @@ def make_calibrated(name, regression="", seed=3):
 
 def draw_commands(calibrated, count=1000, seed=5):
     """Draw commands within and somewhat beyond the fitted range, and their loads."""
-    states = make_states(calibrated.robot.joints, count, seed, force=80.0, span=1.6)
+    states = make_reachable_states(calibrated.robot, count, seed, force=80.0, span=1.6)
     return calibrated.robot.reported_angles(states.joint_angles), states.wrench
 
 

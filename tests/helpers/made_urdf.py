@@ -96,11 +96,52 @@ def written(folder, *parts, **more):
     return path
 
 
-class Pinocchio:
-    """A URDF in pinocchio. Joints are set by name; all others are at zero."""
+# An arm whose fourth joint keeps the forearm's angle to the upper arm, as linkages do: six
+# joints are commanded.
+HALF_PI = np.pi / 2
+LINKAGE_COMMANDS = ("j1", "j2", "j3", "j4", "j5", "j6")
+LINKAGE_JOINTS = ("j1", "j2", "j3", "linkage", "j4", "j5", "j6")
 
-    def __init__(self, path):
-        self.model = pin.buildModelFromXML(path.read_text(encoding="utf-8"))
+
+def write_linkage(folder, shift=(0.1, 0.0, 0.0), multiplier=-1.0, offset=0.1):
+    """Write the URDF of this arm; the arguments are of the joint that follows."""
+    links = ("base", "post", "arm", "beam", "plate", "forearm", "wrist", "hand", "tool")
+    return written(
+        folder,
+        *map(link, links),
+        joint("j1", "base", "post", xyz=(0, 0, 0.4), limits=(-3, 3)),
+        joint(
+            "j2",
+            "post",
+            "arm",
+            xyz=(0.2, 0, 0.1),
+            rpy=(-HALF_PI, 0, 0),
+            limits=(-1.5, 1.5),
+        ),
+        joint("j3", "arm", "beam", xyz=(0.7, 0, 0), limits=(-1.4, 1.4)),
+        joint(
+            "linkage",
+            "beam",
+            "plate",
+            xyz=shift,
+            limits=(-3, 3),
+            mimic=("j2", multiplier, offset),
+        ),
+        joint("j4", "plate", "forearm", xyz=(0.2, 0, 0), rpy=(0, HALF_PI, 0)),
+        joint("j5", "forearm", "wrist", xyz=(0, 0, 0.5), rpy=(0, -HALF_PI, 0)),
+        joint("j6", "wrist", "hand", xyz=(0.1, 0, 0), rpy=(0, HALF_PI, 0)),
+        joint("flange", "hand", "tool", "fixed", xyz=(0.05, 0, 0.15)),
+        name="linkage",
+    )
+
+
+class Pinocchio:
+    """A URDF in pinocchio. Joints are set by name; all others are at zero, or follow with
+    `mimic`."""
+
+    def __init__(self, path, *, mimic=False):
+        text = path.read_text(encoding="utf-8")
+        self.model = pin.buildModelFromXML(text, mimic=mimic)
         self.model.gravity.linear = GRAVITY
         self.data = self.model.createData()
 
@@ -139,21 +180,30 @@ class Pinocchio:
 
 
 def assert_same_poses(
-    robot, path, base, tip, set_joints=None, count=8, within=1e-9, names=None
+    robot,
+    path,
+    base,
+    tip,
+    set_joints=None,
+    count=8,
+    within=1e-9,
+    names=None,
+    *,
+    mimic=False,
 ):
     """Check the poses of a robot against pinocchio, to a nanometre and a nanoradian by
     default, at random joint angles that a controller reports.
 
     `set_joints` maps the values of joints by name to those of further joints.
     """
-    by_pinocchio = Pinocchio(path)
+    by_pinocchio = Pinocchio(path, mimic=mimic)
     rng = np.random.default_rng(5)
-    angles = rng.uniform(-np.pi, np.pi, (count, robot.joints))
+    angles = rng.uniform(-np.pi, np.pi, (count, robot.commands))
     position, rotation = compute_poses(
         robot.chain, robot.model_angles(angles), robot.chain.end_effector
     )
     for index, state in enumerate(angles):
-        values = dict(zip(names or robot.joint_names, state, strict=True))
+        values = dict(zip(names or robot.command_names, state, strict=True))
         if set_joints:
             values |= set_joints(values)
         expected_position, expected_rotation = by_pinocchio.pose(base, tip, values)

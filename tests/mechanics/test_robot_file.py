@@ -105,7 +105,7 @@ def test_without_compliances_typical_ones_count_as_unknown_and_are_never_written
         (
             {"reported_joints": {"matrix": [[1, 0]]}},
             "reported_joints",
-            ["2 rows of 2 numbers"],
+            ["rows of [2]", "2 rows", "up to 2"],
         ),
         (
             {"reported_joints": {"offset_deg": [1, 2, 3]}},
@@ -115,7 +115,17 @@ def test_without_compliances_typical_ones_count_as_unknown_and_are_never_written
         (
             {"reported_joints": {"matrix": [[1, 0], [1]]}},
             "reported_joints",
-            ["2 rows of 2 numbers"],
+            ["rows of [2, 1]", "the same count"],
+        ),
+        (
+            {"reported_joints": {"matrix": [[1, 1], [2, 2]]}},
+            "reported_joints",
+            ["several reported angles", "independent columns"],
+        ),
+        (
+            {"reported_joints": {"matrix": [[1], [2]], "names": ["a", "b"]}},
+            "reported_joints.names",
+            ["2 names", "each of the 1 reported"],
         ),
         ({"lengths_m": None}, "chain", ["'Tz(l1)'", "metres"]),
         ({"lengths_m": {"l1": 1, "l2": 1, "l3": 1, "l4": 1}}, "lengths_m", ["l4"]),
@@ -205,6 +215,8 @@ def test_faulty_robot_file_is_refused_in_one_line(changes, key, words):
         # An offset alone, and a matrix alone.
         {"reported_joints": {"offset_deg": [90, -45]}},
         {"reported_joints": {"matrix": [[1, 0], [1, -1]]}},
+        # The second joint follows the first.
+        {"reported_joints": {"matrix": [[1], [-0.5]], "names": ["shoulder"]}},
     ],
 )
 def test_a_described_robot_parses_to_the_same_robot(changes):

@@ -32,6 +32,7 @@ from elastocal.application.inverse_kinematics import (
     compute_determinants,
     compute_reach_m,
     find_beyond_limits,
+    find_turning_joints,
     solve_path,
     solve_poses,
 )
@@ -156,7 +157,7 @@ def find_joint_targets(
         stated = robot.model_angles(start)
         angles, residual_m = solve_poses(robot, position, rotation, stated)
         turns = np.round((angles - stated) / (2 * np.pi))
-        angles -= np.where(robot.chain.prismatic, 0.0, 2 * np.pi * turns)
+        angles -= np.where(find_turning_joints(robot), 2 * np.pi * turns, 0.0)
         in_other_posture = _find_other_postures(robot, stated, angles)
     targets = _NominalTargets(position, rotation, wrench, angles, residual_m)
     chunks = [targets.select(rows) for rows in split_into_chunks(len(position))]
@@ -184,7 +185,7 @@ def _find_other_postures(
     """
     largest = np.where(robot.chain.prismatic, compute_reach_m(robot), 1.0)
     is_far = (np.abs(solution - stated) > largest * _POSTURE_RAD).any(axis=1)
-    if robot.joints != 6:
+    if robot.commands != 6:
         return np.asarray(is_far)
     sides = _find_side(robot, stated) * _find_side(robot, solution)
     return np.asarray(is_far | (sides < 0))
@@ -255,15 +256,16 @@ def _correct_chunk(calibrated: CalibratedRobot, targets: _NominalTargets) -> Cor
     uncorrected = robot.reported_angles(targets.angles)
     current = _find_equilibria(calibrated, targets, uncorrected)
     error_before = current.error.copy()
-    inverse = np.linalg.pinv(
-        compute_jacobians(robot.chain, targets.angles, robot.chain.end_effector)
-    )
+    jacobian = compute_jacobians(robot.chain, targets.angles, robot.chain.end_effector)
+    inverse = np.linalg.pinv(robot.restrict_jacobians(jacobian))
     angles = targets.angles.copy()
     is_singular = np.zeros(len(angles), bool)
     # Only these rows need another step. Most of them are near singular postures.
     rows = np.flatnonzero(targets.is_reached)
     for iteration in range(_STEPS):
-        step = (inverse[rows] @ current.error[rows, :, None])[..., 0]
+        step = robot.expand_steps(
+            (inverse[rows] @ current.error[rows, :, None])[..., 0]
+        )
         change = np.abs(angles[rows] + step - targets.angles[rows]).max(axis=1)
         is_small = change <= _LARGEST_CORRECTION
         is_singular[rows[~is_small]] = True

@@ -101,7 +101,7 @@ def solve_poses(
     """
     angles = start.copy()
     trial_angles = start.copy()
-    best = _PoseErrors.infinite(len(start), robot.joints)
+    best = _PoseErrors.infinite(len(start), robot.commands)
     damping = np.full(len(start), _DAMPING)
     rows = np.arange(len(start))
     for _ in range(_ITERATIONS):
@@ -121,8 +121,8 @@ def solve_poses(
         )
         if not len(rows):
             break
-        trial_angles[rows] = angles[rows] + _compute_damped_steps(
-            best.jacobian[rows], best.error[rows], damping[rows]
+        trial_angles[rows] = angles[rows] + robot.expand_steps(
+            _compute_damped_steps(best.jacobian[rows], best.error[rows], damping[rows])
         )
     return angles, best.length_m
 
@@ -135,7 +135,8 @@ class _PoseErrors:
     ----------
     length_m : (N,) size of the errors.
     error : (N, 6) wanted less reached pose, m.
-    jacobian : (N, 6, n) derivatives of the pose by the joint angles, m/rad.
+    jacobian : (N, 6, m) derivatives of the pose by the motions that commands bring
+        about, see `Robot.restrict_jacobians`, m/rad.
     """
 
     length_m: np.ndarray
@@ -143,10 +144,10 @@ class _PoseErrors:
     jacobian: np.ndarray
 
     @classmethod
-    def infinite(cls, count: int, joints: int) -> _PoseErrors:
+    def infinite(cls, count: int, commands: int) -> _PoseErrors:
         """Errors that are larger than any other."""
         error = np.zeros((count, 6))
-        return cls(np.full(count, np.inf), error, np.zeros((count, 6, joints)))
+        return cls(np.full(count, np.inf), error, np.zeros((count, 6, commands)))
 
 
 def _compute_pose_errors(
@@ -161,7 +162,8 @@ def _compute_pose_errors(
     )
     error = differences * scale
     length_m = np.sqrt((error**2).sum(axis=1))
-    return _PoseErrors(length_m, error, jacobian * scale[:, None])
+    jacobian = robot.restrict_jacobians(jacobian * scale[:, None])
+    return _PoseErrors(length_m, error, jacobian)
 
 
 def _compute_damped_steps(
@@ -233,7 +235,7 @@ def solve_path(
     -------
     angles, error_m : (N, n) and (N,) as in `solve_poses`.
     """
-    arm = find_closed_form(robot.chain)
+    arm = None if robot.has_followers else find_closed_form(robot.chain)
     if arm is None:
         solutions = _solve_from_anchors(robot, position, rotation)
     else:
@@ -269,13 +271,13 @@ def solve_path(
 
 
 def compute_determinants(robot: Robot, angles: np.ndarray) -> np.ndarray:
-    """Compute the determinants (...) of the Jacobian of six joints at angles (..., 6).
+    """Compute the determinants (...) of the Jacobian of six commands at angles (..., n).
 
     Angles count as lengths at the reach, in which the Jacobian is normalised.
     """
     scale = np.repeat([1.0 / compute_reach_m(robot), 1.0], 3)[:, None]
     jacobian = compute_jacobians(robot.chain, angles, robot.chain.end_effector)
-    return np.asarray(np.linalg.det(jacobian * scale))
+    return np.asarray(np.linalg.det(robot.restrict_jacobians(jacobian * scale)))
 
 
 def _find_singular(robot: Robot, solutions: _Solutions) -> np.ndarray:
@@ -331,10 +333,9 @@ def _solve_from_all_starts(
 ) -> _Solutions:
     """Solve each row from the middle of the limits and from random angles within
     them."""
-    low, high = robot.joint_limits.T
-    shares = np.random.default_rng(0).random((_STARTS, robot.joints))
-    starts = low + (high - low) * shares
-    starts[0] = 0.5 * (low + high)
+    shares = np.random.default_rng(0).random((_STARTS, robot.commands))
+    shares[0] = 0.5
+    starts = robot.spread_angles(shares, robot.joint_limits)
     angles, error_m = solve_poses(
         robot,
         np.tile(position, (_STARTS, 1)),
@@ -408,13 +409,18 @@ def _move_into_limits(robot: Robot, angles: np.ndarray) -> np.ndarray:
     lower limit."""
     low = _narrow_limits(robot)[:, 0]
     turns = np.floor((angles - low + JOINT_ROUNDING) / _find_periods(robot))
-    return angles - np.where(robot.chain.prismatic, 0.0, 2 * np.pi * turns)
+    return angles - np.where(find_turning_joints(robot), 2 * np.pi * turns, 0.0)
+
+
+def find_turning_joints(robot: Robot) -> np.ndarray:
+    """Whether a whole turn of a joint alone keeps the pose, (n,) bool."""
+    return ~np.array(robot.chain.prismatic) & ~robot.is_coupled
 
 
 def _find_periods(robot: Robot) -> np.ndarray:
     """Return the change of each joint (n,) that does not change the pose: a turn, or
-    infinity for a prismatic joint."""
-    return np.where(robot.chain.prismatic, np.inf, 2 * np.pi)
+    infinity for a joint that has none alone."""
+    return np.where(find_turning_joints(robot), 2 * np.pi, np.inf)
 
 
 def _copy_postures(

@@ -24,8 +24,13 @@ from scipy.spatial.transform import Rotation
 from elastocal.effects.gravity import DECLARED_WEIGHT
 from elastocal.effects.protocol import effect_of
 from elastocal.exchange.robot_text import make_elementary_transform
-from elastocal.exchange.urdf_writing import estimate_inertia, number_joints
+from elastocal.exchange.urdf_writing import (
+    estimate_inertia,
+    find_followed_joint,
+    number_joints,
+)
 from elastocal.mechanics.chain import AXES
+from elastocal.mechanics.robot_file import parse_robot
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -59,7 +64,8 @@ class MjcfModel:
     ----------
     text : contents of the file. Joints and servos have the names of the robot's joints,
         or ``joint1`` and so on; their coordinates are the angles of the chain. The site
-        with the name of the end effector has its pose.
+        with the name of the end effector has its pose. If joints follow others, the
+        servo of each gets its own angle, and ``equality`` states which they are.
     left_out : keys of the effects that it does not contain.
     """
 
@@ -81,6 +87,7 @@ def build_mjcf(model: ModelFile) -> MjcfModel:
         [effect for effect in expressed if effect_of(effect.key) == _PAYLOAD]
     )
     arm.add_end_effector()
+    arm.add_followers()
     ElementTree.indent(arm.root)
     text = ElementTree.tostring(arm.root, encoding="unicode") + "\n"
     return MjcfModel(text, left_out)
@@ -115,6 +122,9 @@ class _Arm:
 
     def __init__(self, model: ModelFile, terms: Sequence[Term]) -> None:
         self._model = model
+        self._names = model.robot.get("joint_names") or number_joints(
+            model.kinematics.joints
+        )
         self._constants = np.zeros(model.kinematics.coordinates)
         self._compliances = np.zeros(model.kinematics.coordinates)
         for term in terms:
@@ -178,6 +188,26 @@ class _Arm:
             self._body, "site", self._take_pose(), name=kinematics.end_effector
         )
 
+    def add_followers(self) -> None:
+        """State which joints follow others, as constraints that are not active: each
+        joint yields by its own compliance, and its servo gets its own command."""
+        robot = parse_robot(self._model.robot)
+        equality = ElementTree.Element("equality")
+        for number in range(robot.joints):
+            follower = find_followed_joint(robot, number)
+            if follower is None:
+                continue
+            ElementTree.SubElement(
+                equality,
+                "joint",
+                joint1=self._names[number],
+                joint2=self._names[follower.joint],
+                polycoef=_format([follower.offset, follower.multiplier, 0.0, 0.0, 0.0]),
+                active="false",
+            )
+        if len(equality):
+            self.root.append(equality)
+
     def _displace(self, kind: str, axis: int, amount: float) -> None:
         if amount:
             self._pose = self._pose @ make_elementary_transform(kind, axis, amount)
@@ -206,8 +236,7 @@ class _Arm:
     def _add_joint(self, transform: ElementaryTransform, compliance: float) -> None:
         number = transform.coordinate
         assert number is not None
-        names = self._model.robot.get("joint_names")
-        name = (names or number_joints(self._model.kinematics.joints))[number]
+        name = self._names[number]
         low, high = self._model.kinematics.joint_limits[number]
         span = _format([low, high])
         self._add_motion(transform, name, compliance, range=span)

@@ -143,7 +143,8 @@ class Kinematics:
     joint_limits : tuple
         Lowest and highest angle of each joint of the chain, rad; of prismatic joints m.
     reported_matrix, reported_offset : tuple
-        Angles of the chain are matrix @ reported + offset.
+        Angles of the chain are matrix @ reported + offset. There are fewer reported
+        angles than joints if joints follow others.
     transforms : tuple of ElementaryTransform
         From the base to the last measuring point.
     end_effector : str

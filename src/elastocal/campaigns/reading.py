@@ -82,7 +82,7 @@ def read_campaign(
     if effects is not None:
         check_declared(document, effects, folder.source)
     plan = parse_measuring(document, folder.source)
-    table = read_measurements(folder.path, robot.joints, list_required_columns(plan))
+    table = read_measurements(folder.path, robot.commands, list_required_columns(plan))
     file = {"table": Path(table.path).name, "header_line": table.header_line}
     return build_campaign(document | file, robot, table, folder.source)
 
@@ -171,11 +171,12 @@ def find_degrees(reported: np.ndarray, robot: Robot) -> np.ndarray:
     -------
     (N, n) bool array.
     """
-    low, high = robot.joint_limits.T
+    leading = robot.leading_joints
+    low, high = robot.joint_limits[leading].T
 
     def excess(reported_angles: np.ndarray) -> np.ndarray:
         """Return by how much angles exceed the limits; negative within them."""
-        angles = robot.model_angles(reported_angles)
+        angles = robot.model_angles(reported_angles)[:, leading]
         return np.asarray(np.maximum(low - angles, angles - high))
 
     largest = max(LARGEST_ROTATION_RAD, np.abs(robot.joint_limits).max())
@@ -268,7 +269,7 @@ def _build_measurements(
 
 
 def _joint_columns(prefix: str, robot: Robot) -> list[str]:
-    return [f"{prefix}{joint}" for joint in range(1, robot.joints + 1)]
+    return [f"{prefix}{joint}" for joint in range(1, robot.commands + 1)]
 
 
 def _refuse_degrees(reported: np.ndarray, table: Cells, robot: Robot) -> None:
@@ -277,7 +278,9 @@ def _refuse_degrees(reported: np.ndarray, table: Cells, robot: Robot) -> None:
     if in_degrees.any(axis=1).mean() <= _GROSS_ERROR_SHARE:
         return
     row, joint = np.argwhere(in_degrees)[0]
-    limits = "from {:.2f} to {:.2f} rad".format(*robot.joint_limits[joint])
+    limits = "from {:.2f} to {:.2f} rad".format(
+        *robot.joint_limits[robot.leading_joints[joint]]
+    )
     allowed = (
         f"rad, not degrees, of a joint that goes {limits} "
         "(counted otherwise: reported_joints of the robot file)"

@@ -79,7 +79,8 @@ def draw_measurements(
     measured = _add_noise(position, rotation, noise, plan)
     columns = {"pose": pose, "load": load, "repeat": repeat}
     columns |= dict(zip(WRENCH_NAMES, wrench.T, strict=True))
-    columns |= {f"q{joint}": column for joint, column in enumerate(angles.T, 1)}
+    for joint, column in enumerate(robot.reported_angles(angles).T, 1):
+        columns[f"q{joint}"] = column
     # One block of rows for each measuring point.
     table = {
         name: np.tile(column, len(plan.points)) for name, column in columns.items()
@@ -90,8 +91,8 @@ def draw_measurements(
 
 def _draw_angles(robot: Robot, poses: int, draws: np.random.Generator) -> np.ndarray:
     """Draw joint angles (poses, n), rad, uniformly within the limits."""
-    low, high = robot.joint_limits.T
-    return np.asarray(low + (high - low) * draws.random((poses, robot.joints)))
+    shares = draws.random((poses, robot.commands))
+    return robot.spread_angles(shares, robot.joint_limits)
 
 
 def _list_approaches(plan: Plan) -> np.ndarray:

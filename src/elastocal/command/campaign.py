@@ -83,7 +83,7 @@ def init(
     if robot is not None:
         files[_ROBOT] = read_text(robot, LARGEST_BYTES)
     if not (folder / CSV).exists() and not (folder / PARQUET).exists():
-        files[CSV] = format_sheet_header(arm.joints)
+        files[CSV] = format_sheet_header(arm.commands)
     files[DOCUMENT] = format_campaign_template(
         folder.resolve().name, arm, targets, measured
     )

@@ -219,7 +219,7 @@ def _compare_misfits(
 
 def list_discrete_hypotheses(campaign: Campaign) -> list[Hypothesis]:
     """List all hypotheses without fitted values, the simplest first."""
-    hypotheses = [*_list_senses(campaign.robot.joints), *_list_lengths(campaign)]
+    hypotheses = [*_list_senses(campaign.robot.commands), *_list_lengths(campaign)]
     if campaign.measured == "pose":
         return [
             *hypotheses,

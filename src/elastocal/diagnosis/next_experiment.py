@@ -86,8 +86,8 @@ def draw_candidate_experiments(
     joint_angles : (E, n), rad
     wrench : (E, 6), at the last measuring point, N and N m
     """
-    low, high = np.clip(robot.joint_limits, -np.pi, np.pi).T
-    angles = low + (high - low) * stream.random((count, len(low)))
+    limits = np.clip(robot.joint_limits, -np.pi, np.pi)
+    angles = robot.spread_angles(stream.random((count, robot.commands)), limits)
     force = np.linalg.norm(states.wrench[:, :3], axis=1)
     if not force.any():
         return angles, np.zeros((count, 6))

@@ -513,10 +513,14 @@ class Model {
   explicit Model(const std::string& text, bool regression = true)
       : Model(detail::JsonReader(text).read(), regression) {}
 
+  // Number of joints of the chain.
   std::size_t joints() const { return joints_; }
 
-  // Names of the joints, or joint1 and so on if the model has none.
-  const std::vector<std::string>& joint_names() const { return joint_names_; }
+  // Number of joint angles of a command, fewer than joints if some follow others.
+  std::size_t commands() const { return commands_; }
+
+  // Names of the joints that are commanded, or joint1 and so on if the model has none.
+  const std::vector<std::string>& command_names() const { return command_names_; }
 
   // Predict where the robot comes to rest at commands, as the controller reports them.
   Pose predict(const std::vector<double>& joint_angles, const Wrench& wrench,
@@ -548,11 +552,11 @@ class Model {
   // uncorrected commands, at which the rigid robot has this pose.
   Correction correct(const Pose& wanted, const std::vector<double>& start, const Wrench& wrench,
                      Workspace& workspace) const {
-    if (joints_ < 6) throw std::invalid_argument("correct needs six joints or more");
+    if (commands_ < 6) throw std::invalid_argument("correct needs six joints or more");
     set_angles(start, workspace);
     walk(workspace, true);
-    const Jacobian directions = compute_jacobian(workspace);
-    Jacobian jacobian = directions;
+    Jacobian jacobian = compute_jacobian(workspace);
+    const Jacobian directions = restrict_to_commands(jacobian);
     approach(wanted, wrench, directions, jacobian, workspace);
     Correction correction;
     Vector3 moved{};
@@ -583,8 +587,9 @@ class Model {
   static constexpr int most_multiples = 64;
 
   std::size_t joints_ = 0;
+  std::size_t commands_ = 0;
   std::size_t coordinates_ = 0;
-  std::vector<std::string> joint_names_;
+  std::vector<std::string> command_names_;
   int iterations_ = 0;
   std::vector<double> matrix_, inverse_, offset_;
   std::vector<detail::Transform> transforms_;
@@ -615,10 +620,11 @@ class Model {
     offset_ = kinematics.at("reported_offset").numbers();
     for (const detail::Json& row : kinematics.at("reported_matrix").items)
       for (double value : row.numbers()) matrix_.push_back(value);
-    inverse_ = invert(matrix_, joints_);
+    commands_ = matrix_.size() / joints_;
+    inverse_ = invert_matrix();
     end_offset_ = kinematics.at("end_effector_offset_m").vector();
     gravity_ = kinematics.at("gravity_m_s2").vector();
-    read_joint_names(json.at("robot"));
+    read_command_names(json.at("robot"));
     read_transforms(kinematics);
     for (const detail::Json& body : kinematics.at("bodies").items)
       bodies_.push_back(read_body(body, "mass_kg", "moment_kg_m"));
@@ -636,11 +642,14 @@ class Model {
       throw std::runtime_error("no elastocal model of version " + std::to_string(version));
   }
 
-  void read_joint_names(const detail::Json& robot) {
+  void read_command_names(const detail::Json& robot) {
     const detail::Json* names = robot.find("joint_names");
-    for (std::size_t joint = 0; joint < joints_; ++joint)
-      joint_names_.push_back(names ? names->items.at(joint).text
-                                   : "joint" + std::to_string(joint + 1));
+    if (commands_ < joints_) names = nullptr;
+    if (const detail::Json* reported = robot.find("reported_joints"))
+      if (const detail::Json* stated = reported->find("names")) names = stated;
+    for (std::size_t command = 0; command < commands_; ++command)
+      command_names_.push_back(names ? names->items.at(command).text
+                                     : "joint" + std::to_string(command + 1));
   }
 
   void read_transforms(const detail::Json& kinematics) {
@@ -831,19 +840,52 @@ class Model {
   }
 
   // Angles of the chain from those that the controller reports.
+  // Find the reported angles of given joint angles: the inverse of the matrix or, if joints
+  // follow others, its left inverse (M'M)^-1 M'.
+  std::vector<double> invert_matrix() const {
+    if (commands_ == joints_) return invert(matrix_, joints_);
+    std::vector<double> gram(commands_ * commands_, 0.0);
+    for (std::size_t i = 0; i < commands_; ++i)
+      for (std::size_t j = 0; j < commands_; ++j)
+        for (std::size_t k = 0; k < joints_; ++k)
+          gram[i * commands_ + j] += matrix_[k * commands_ + i] * matrix_[k * commands_ + j];
+    const std::vector<double> inverse_gram = invert(gram, commands_);
+    std::vector<double> inverse(commands_ * joints_, 0.0);
+    for (std::size_t i = 0; i < commands_; ++i)
+      for (std::size_t k = 0; k < joints_; ++k)
+        for (std::size_t j = 0; j < commands_; ++j)
+          inverse[i * joints_ + k] += inverse_gram[i * commands_ + j] * matrix_[k * commands_ + j];
+    return inverse;
+  }
+
+  // Restrict a Jacobian to motions that commands bring about, M (left inverse) J'.
+  Jacobian restrict_to_commands(const Jacobian& jacobian) const {
+    if (commands_ == joints_) return jacobian;
+    Jacobian of_commands(commands_), restricted(joints_);
+    for (std::size_t i = 0; i < 6; ++i) {
+      for (std::size_t c = 0; c < commands_; ++c)
+        for (std::size_t k = 0; k < joints_; ++k)
+          of_commands[c][i] += inverse_[c * joints_ + k] * jacobian[k][i];
+      for (std::size_t k = 0; k < joints_; ++k)
+        for (std::size_t c = 0; c < commands_; ++c)
+          restricted[k][i] += matrix_[k * commands_ + c] * of_commands[c][i];
+    }
+    return restricted;
+  }
+
   void set_angles(const std::vector<double>& reported, Workspace& workspace) const {
-    if (reported.size() != joints_) throw std::invalid_argument("another number of joints");
+    if (reported.size() != commands_) throw std::invalid_argument("another number of joints");
     for (std::size_t i = 0; i < joints_; ++i) {
       double angle = offset_[i];
-      for (std::size_t j = 0; j < joints_; ++j) angle += matrix_[i * joints_ + j] * reported[j];
+      for (std::size_t j = 0; j < commands_; ++j) angle += matrix_[i * commands_ + j] * reported[j];
       workspace.angles[i] = angle;
     }
     evaluate_waves(workspace);
   }
 
   std::vector<double> report_angles(const std::vector<double>& angles) const {
-    std::vector<double> reported(joints_, 0.0);
-    for (std::size_t i = 0; i < joints_; ++i)
+    std::vector<double> reported(commands_, 0.0);
+    for (std::size_t i = 0; i < commands_; ++i)
       for (std::size_t j = 0; j < joints_; ++j)
         reported[i] += inverse_[i * joints_ + j] * (angles[j] - offset_[j]);
     return reported;

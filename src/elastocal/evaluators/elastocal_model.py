@@ -34,7 +34,7 @@ class Correction:
 
     Attributes
     ----------
-    joint_angles : (N, n) array, as the controller reports them.
+    joint_angles : (N, m) array, as the controller reports them.
     error : (N, 6) array
         Wanted less predicted pose, m and rad.
     """
@@ -72,11 +72,20 @@ class Model:
             raise ValueError(f"the regression {name} has no formula: regression=False")
         self._matrix = np.array(self._kinematics["reported_matrix"])
         self._offset = np.array(self._kinematics["reported_offset"])
+        # Directions in which commands move the joints: all, unless joints follow others.
+        self._directions = np.eye(self.joints)
+        if self.commands < self.joints:
+            self._directions = np.linalg.qr(self._matrix)[0]
 
     @property
     def joints(self) -> int:
-        """Number of joints."""
+        """Number of joints of the chain."""
         return int(self._kinematics["joints"])
+
+    @property
+    def commands(self) -> int:
+        """Number of reported joint angles, fewer than joints if some follow others."""
+        return int(self._matrix.shape[1])
 
     def predict(
         self, joint_angles: np.ndarray, wrenches: np.ndarray | None = None
@@ -85,7 +94,7 @@ class Model:
 
         Parameters
         ----------
-        joint_angles : (N, n) array, as the controller reports them.
+        joint_angles : (N, m) array, as the controller reports them.
         wrenches : (N, 6) array, optional
             Loads at the origin of the last measuring point's frame.
 
@@ -124,13 +133,14 @@ class Model:
         Parameters
         ----------
         position, rotation : (N, 3) and (N, 3, 3) arrays, wanted poses.
-        start : (N, n) array
+        start : (N, m) array
             Uncorrected commands, at which the rigid robot has these poses.
         wrenches : (N, 6) array, optional
         """
         angles, wrench = self._check(start, wrenches)
         end = self._walk(self._place(angles))
-        inverse = np.linalg.pinv(self._compute_jacobian(end)[..., : self.joints])
+        jacobian = self._compute_jacobian(end)[..., : self.joints] @ self._directions
+        inverse = self._directions @ np.linalg.pinv(jacobian)
         displacement = np.zeros((len(angles), 3))
         for step in range(_STEPS):
             reached, reached_rotation, loads = self._come_to_rest(angles, wrench)
@@ -142,7 +152,7 @@ class Model:
             if np.abs(error).max(initial=0.0) < _CONVERGED_M:
                 break
             angles = angles + (inverse @ error[..., None])[..., 0]
-        reported = np.linalg.solve(self._matrix, (angles - self._offset).T).T
+        reported = (angles - self._offset) @ np.linalg.pinv(self._matrix).T
         return Correction(reported, error)
 
     def _check(

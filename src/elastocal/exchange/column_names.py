@@ -304,7 +304,7 @@ def _recognize_headers(
 ) -> Iterator[_Header]:
     """Recognize each header by an option, by the robot's joint names, or by its usual
     names."""
-    joint_names = (robot.joint_names if robot else None) or ()
+    joint_names = (robot.command_names if robot else None) or ()
     names_of_joints = {
         _simplify(joint_name): f"q{joint}"
         for joint, joint_name in enumerate(joint_names, 1)

@@ -172,7 +172,7 @@ def correct_makers_file(original: MakersFile, nominal: Robot, calibrated: Robot)
     """
     frames = _find_frames(original, nominal)
     links = split_chain(calibrated.chain)
-    zero_angles = calibrated.model_angles(np.zeros(nominal.joints))
+    zero_angles = calibrated.model_angles(np.zeros(nominal.commands))
     origins = []
     for number, fixed in enumerate(links.fixed[: len(original.origins)]):
         before = frames[number]

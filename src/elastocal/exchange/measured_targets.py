@@ -243,7 +243,7 @@ def read_target_measurements(
     columns, stated_units = find_columns(text, {}, robot)
     notation = find_rotation(text, columns, _state_notation(text))
     table = PoseTable(text, columns, stated_units, notation)
-    angles = [f"q{joint}" for joint in range(1, robot.joints + 1)]
+    angles = [f"q{joint}" for joint in range(1, robot.commands + 1)]
     if not all(name in columns for name in angles):
         angles = []
     wanted = [*POSITION, *table.orientation, *angles]

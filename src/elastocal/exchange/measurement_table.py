@@ -397,15 +397,15 @@ def _check_complete(layout: PoseTable, robot: Robot | None) -> None:
     angles = layout.angles
     if not angles:
         raise _no_angles_error(layout, robot, unused)
-    if robot and len(angles) > robot.joints:
+    if robot and len(angles) > robot.commands:
         headers = ", ".join(columns[name] for name in angles)
         raise InputError(
             path,
             "header",
             f"{format_count(len(angles), 'joint')}: {headers}",
-            f"{robot.joints}, as {robot.name} has; --ignore NAME leaves a column out",
+            f"{robot.commands}, as {robot.name} has; --ignore NAME leaves a column out",
         )
-    joints = robot.joints if robot else int(angles[-1][1:])
+    joints = robot.commands if robot else int(angles[-1][1:])
     all_angles = [f"q{joint}" for joint in range(1, joints + 1)]
     for needed in (all_angles, [*layout.position, *layout.orientation]):
         missing = [name for name in needed if name not in columns]
@@ -428,8 +428,8 @@ def _describe_other_file(missing: Sequence[str]) -> str:
 def _no_angles_error(layout: PoseTable, robot: Robot | None, unused: str) -> InputError:
     """Make the error of a table without joint angles."""
     joint_names = ""
-    if robot and robot.joint_names:
-        joint_names = f" or as the robot has them: {', '.join(robot.joint_names)}"
+    if robot and robot.command_names:
+        joint_names = f" or as the robot has them: {', '.join(robot.command_names)}"
     return InputError(
         layout.text.path,
         "header",

@@ -172,6 +172,9 @@ def summarize_import(imported: ImportedRobot) -> list[str]:
     prismatic = sum(robot.chain.prismatic)
     if prismatic:
         joints += f", {prismatic} of them prismatic"
+    followers = robot.joints - robot.commands
+    if followers:
+        joints += f", {followers} of them follow others"
     length = math.fsum(
         abs(transform.constant)
         for transform in robot.chain.transforms

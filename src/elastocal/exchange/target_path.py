@@ -265,13 +265,13 @@ def read_target_path_for(
 ) -> TargetPath:
     """Read a file of target poses for a robot; joint angles in degrees are refused too
     unless they are stated to be so."""
-    targets = read_target_path(path, robot.joints, options, robot)
+    targets = read_target_path(path, robot.commands, options, robot)
     if targets.start is None:
         return targets
     in_degrees = find_degrees(targets.start, robot)
     if in_degrees.any():
         row, joint = np.argwhere(in_degrees)[0]
-        low, high = robot.joint_limits[joint]
+        low, high = robot.joint_limits[robot.leading_joints[joint]]
         raise InputError(
             path,
             f"line {targets.lines[row]}",

@@ -45,7 +45,8 @@ def unwrap_into_limits(
     angles = reported.copy()
     notes = []
     for joint, header in enumerate(headers):
-        if robot.chain.prismatic[joint] or not _counts_alone(robot, joint):
+        leading = robot.leading_joints[joint]
+        if robot.chain.prismatic[leading] or not _counts_alone(robot, joint):
             continue
         turns = _find_turns(reported, robot, joint)
         if turns.any():
@@ -61,9 +62,10 @@ def unwrap_into_limits(
 def _counts_alone(robot: Robot, joint: int) -> bool:
     """Whether a reported angle turns one joint of the chain, and turns it as far."""
     matrix = np.abs(robot.reported_matrix)
-    is_coupled = np.delete(matrix[joint], joint).any()
-    is_coupled |= np.delete(matrix[:, joint], joint).any()
-    return bool(matrix[joint, joint] == 1.0 and not is_coupled)
+    leading = robot.leading_joints[joint]
+    is_coupled = np.delete(matrix[leading], joint).any()
+    is_coupled |= np.delete(matrix[:, joint], leading).any()
+    return bool(matrix[leading, joint] == 1.0 and not is_coupled)
 
 
 def _find_turns(reported: np.ndarray, robot: Robot, joint: int) -> np.ndarray:
@@ -88,6 +90,7 @@ def _find_turns(reported: np.ndarray, robot: Robot, joint: int) -> np.ndarray:
 
 def _find_outside(reported: np.ndarray, robot: Robot, joint: int) -> np.ndarray:
     """Find angles (N,) of a joint beyond its limits."""
-    low, high = robot.joint_limits[joint]
-    angle = robot.model_angles(reported)[:, joint]
+    leading = robot.leading_joints[joint]
+    low, high = robot.joint_limits[leading]
+    angle = robot.model_angles(reported)[:, leading]
     return (angle < low - _BEYOND_LIMITS_RAD) | (angle > high + _BEYOND_LIMITS_RAD)

@@ -59,6 +59,8 @@ _NUMBERS = {
     ("limit", "lower"): (1, "0"),
     ("limit", "upper"): (1, "0"),
     ("mass", "value"): (1, ""),
+    ("mimic", "multiplier"): (1, "1"),
+    ("mimic", "offset"): (1, "0"),
 }
 # Upper bound on the numbers of a limit: programs write 1e16 and more if a joint has none.
 _LARGEST_LIMIT = 1e100
@@ -82,6 +84,22 @@ _NAMED = 4
 
 
 @dataclass(frozen=True)
+class Mimic:
+    """How a joint follows another one: its value is the multiplier times the other's
+    value, plus the offset.
+
+    Attributes
+    ----------
+    joint : name of the other joint.
+    multiplier, offset : rad/rad and rad; m for prismatic joints.
+    """
+
+    joint: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True)
 class Joint:
     """A joint of a URDF.
 
@@ -91,7 +109,7 @@ class Joint:
     origin : transform (4, 4) from the parent's frame.
     axis : direction (3,) in the joint's own frame.
     lower, upper : limits, rad or m; 0 if they are not stated.
-    mimics : whether the joint follows another one.
+    mimic : how the joint follows another one, None if it does not.
     """
 
     name: str
@@ -102,7 +120,7 @@ class Joint:
     axis: np.ndarray
     lower: float
     upper: float
-    mimics: bool
+    mimic: Mimic | None
 
     @property
     def has_limits_in_radians(self) -> bool:
@@ -143,6 +161,21 @@ class Urdf:
 
 
 @dataclass(frozen=True)
+class UrdfCommands:
+    """The joints of a URDF that are commanded, because they follow no other.
+
+    Attributes
+    ----------
+    names : names of m joints, those of the chain first.
+    matrix, offset : (n, m) and (n,) arrays, as in `Robot`.
+    """
+
+    names: tuple[str, ...]
+    matrix: np.ndarray
+    offset: np.ndarray
+
+
+@dataclass(frozen=True)
 class UrdfChain:
     """The serial chain between two links.
 
@@ -150,6 +183,8 @@ class UrdfChain:
     ----------
     notation : the chain with its measuring points in the chain notation.
     joints : the joints of q1, q2, ...
+    commands : how the values of these follow from those of the joints that are
+        commanded
     links : by the name of each link on the chain, the number of the joint that carries
         it, 0 for the column; and its frame (4, 4) in the frame directly behind that
         joint.
@@ -157,6 +192,7 @@ class UrdfChain:
 
     notation: str
     joints: tuple[Joint, ...]
+    commands: UrdfCommands
     links: dict[str, tuple[int, np.ndarray]]
 
 
@@ -186,12 +222,10 @@ def robot_from_urdf(
         "chain": chain.notation,
         "joint_limits_deg": [_convert_limits(joint, source) for joint in chain.joints],
     }
-    for joint in chain.joints:
-        if joint.kind == "revolute" and not joint.has_limits_in_radians:
-            limits = "no limits in the URDF"
-            if joint.lower < joint.upper:
-                limits = f"limits of {joint.lower:g} to {joint.upper:g}, no radians"
-            notes.append(f"joint {joint.name!r} has {limits}: a turn either way")
+    if any(joint.mimic for joint in chain.joints):
+        document["reported_joints"] = _describe_commands(chain)
+        notes.append(_describe_followers(chain))
+    notes += _note_missing_limits(chain.joints)
     # The root of the tree stands upright.
     transform = np.eye(4)
     for joint in urdf.path_to(base, None):
@@ -219,6 +253,44 @@ def robot_from_urdf(
             f"joints that are no part of the chain, left out: {', '.join(omitted)}"
         )
     return check_imported(document, path, f"the links from {base!r} to {tip!r}", notes)
+
+
+def _note_missing_limits(joints: Sequence[Joint]) -> list[str]:
+    """Note joints that turn without limits in radians."""
+    notes = []
+    for joint in joints:
+        if joint.kind == "revolute" and not joint.has_limits_in_radians:
+            limits = "no limits in the URDF"
+            if joint.lower < joint.upper:
+                limits = f"limits of {joint.lower:g} to {joint.upper:g}, no radians"
+            notes.append(f"joint {joint.name!r} has {limits}: a turn either way")
+    return notes
+
+
+def _describe_commands(chain: UrdfChain) -> dict[str, Any]:
+    """Describe the commanded joints as ``reported_joints`` of a robot file."""
+    offset = [
+        value if joint.kind == "prismatic" else math.degrees(value)
+        for joint, value in zip(chain.joints, chain.commands.offset, strict=True)
+    ]
+    return {
+        "matrix": chain.commands.matrix.tolist(),
+        "offset_deg": [float(value) for value in offset],
+        "names": list(chain.commands.names),
+    }
+
+
+def _describe_followers(chain: UrdfChain) -> str:
+    """Say which joints are not commanded, and what the reported angles are."""
+    followers = [
+        f"{joint.name!r} follows {joint.mimic.joint!r}"
+        for joint in chain.joints
+        if joint.mimic is not None
+    ]
+    commands = ", ".join(
+        f"q{number} of {name!r}" for number, name in enumerate(chain.commands.names, 1)
+    )
+    return f"{list_first(followers, _NAMED)}; measurements have the angles {commands}"
 
 
 def _convert_limits(joint: Joint, source: str) -> list[float]:
@@ -290,8 +362,19 @@ def _read_joint(element: Element, source: str) -> Joint:
         np.array(numbers("axis", "xyz")),
         lower,
         upper,
-        mimics=element.find("mimic") is not None,
+        _read_mimic(element, source),
     )
+
+
+def _read_mimic(element: Element, source: str) -> Mimic | None:
+    """Read how a joint follows another one. A fixed joint follows none."""
+    mimic = element.find("mimic")
+    if mimic is None or element.attrib["type"] == "fixed":
+        return None
+    key = f"joint {element.attrib['name']!r}"
+    (multiplier,) = _read_numbers(element, "mimic", "multiplier", key, source)
+    (offset,) = _read_numbers(element, "mimic", "offset", key, source)
+    return Mimic(mimic.get("joint", ""), multiplier, offset)
 
 
 def _read_numbers(
@@ -496,7 +579,47 @@ def find_chain(
             frame = make_transform(axis.rotation.T)
         tokens.append(marks.get(joint.child, ""))
         links[joint.child] = (len(moving), frame)
-    return UrdfChain(" ".join(filter(None, tokens)), tuple(moving), links)
+    notation = " ".join(filter(None, tokens))
+    return UrdfChain(
+        notation, tuple(moving), _find_commands(urdf, moving, source), links
+    )
+
+
+def _find_commands(urdf: Urdf, joints: Sequence[Joint], source: str) -> UrdfCommands:
+    """Find the joints that are commanded, and how `joints` of a chain follow them."""
+    leaders = [_follow_mimics(urdf, joint, source) for joint in joints]
+    own = [joint.name for joint in joints if joint.mimic is None]
+    names = tuple(dict.fromkeys([*own, *(leader.joint for leader in leaders)]))
+    matrix = np.zeros((len(joints), len(names)))
+    for row, leader in enumerate(leaders):
+        matrix[row, names.index(leader.joint)] = leader.multiplier
+    return UrdfCommands(names, matrix, np.array([leader.offset for leader in leaders]))
+
+
+def _follow_mimics(urdf: Urdf, joint: Joint, source: str) -> Mimic:
+    """Find the commanded joint that a joint follows, by way of others if need be; a
+    joint that follows none is its own."""
+    by_name = {joint.name: joint for joint in urdf.joints}
+    leader = Mimic(joint.name, 1.0, 0.0)
+    followed = {joint.name}
+    while (mimic := by_name[leader.joint].mimic) is not None:
+        key = f"joint {leader.joint!r}: mimic"
+        target = by_name.get(mimic.joint)
+        if target is None or target.kind not in _MOVING:
+            allowed = f"a joint of this file that moves: {suggest_names(mimic.joint, [*by_name])}"
+            raise InputError(source, key, repr(mimic.joint), allowed)
+        if mimic.joint in followed:
+            raise InputError(source, key, "joints that follow each other", "no loop")
+        if mimic.multiplier == 0.0:
+            allowed = "another number; a joint that does not move is fixed"
+            raise InputError(source, f"{key} multiplier", "0", allowed)
+        followed.add(mimic.joint)
+        leader = Mimic(
+            mimic.joint,
+            leader.multiplier * mimic.multiplier,
+            leader.multiplier * mimic.offset + leader.offset,
+        )
+    return leader
 
 
 def _find_path(urdf: Urdf, base: str, tip: str, source: str) -> list[Joint]:
@@ -530,19 +653,12 @@ def _check_joint(joint: Joint, source: str) -> None:
     """Refuse a joint that cannot be part of a serial chain."""
     key = f"joint {joint.name!r}"
     kinds = (*_MOVING, "fixed")
-    if joint.mimics or joint.kind not in kinds:
-        problem = f"type {joint.kind}"
-        if joint.mimics:
-            problem = "a joint that mimics another one"
-        raise InputError(
-            source,
-            key,
-            problem,
-            (
-                f"{' | '.join(kinds)}; parallel links are written in the robot file, see"
-                " docs/campaign.md"
-            ),
+    if joint.kind not in kinds:
+        allowed = (
+            f"{' | '.join(kinds)}; parallel links are written in the robot file, see"
+            " docs/campaign.md"
         )
+        raise InputError(source, key, f"type {joint.kind}", allowed)
     if joint.kind in _MOVING and not np.linalg.norm(joint.axis) > _SHORTEST_AXIS:
         axis = " ".join(f"{component:g}" for component in joint.axis)
         raise InputError(source, f"{key}: axis xyz", axis, "a direction")

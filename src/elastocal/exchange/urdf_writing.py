@@ -197,7 +197,9 @@ def _correct_origins(
 def find_offset_at_zero(nominal: Robot, calibrated: Robot) -> np.ndarray:
     """Angles of the calibrated robot at which those of the nominal robot are zero,
     ndarray (n,): the joint values of the URDF are the nominal angles."""
-    factor = calibrated.reported_matrix @ np.linalg.inv(nominal.reported_matrix)
+    inverse = np.linalg.pinv(nominal.reported_matrix)
+    change = calibrated.reported_matrix - nominal.reported_matrix
+    factor = np.eye(nominal.joints) + change @ inverse
     return calibrated.reported_offset - factor @ nominal.reported_offset
 
 
@@ -206,7 +208,8 @@ def build_urdf(nominal: Robot, calibrated: Robot) -> str:
 
     Its joints have the names of the robot, or ``joint1`` and so on, and values that mean
     the angles of the nominal chain. The base is ``base_link``; the last link has the name
-    of the last measuring point. Factors and couplings of joint values have no place in it.
+    of the last measuring point. Factors and couplings of joint values have no place in it,
+    but joints that follow one other joint mimic it.
     """
     root = ElementTree.Element("robot", name=format_point_name(calibrated.name))
     links = split_chain(calibrated.chain)
@@ -222,10 +225,58 @@ def build_urdf(nominal: Robot, calibrated: Robot) -> str:
         kind = "revolute" if moving.kind == "R" else "prismatic"
         joint = _add_joint(root, names[number], kind, (parent, child), origin)
         _limit_motion(joint, moving, nominal.joint_limits[number])
+        follower = find_followed_joint(nominal, number)
+        if follower is not None:
+            _add_mimic(joint, names[follower.joint], follower)
         parent = child
     _add_tip(root, parent, calibrated.chain.end_effector, links.fixed[-1])
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+@dataclass(frozen=True)
+class Follower:
+    """A joint whose angle is a multiple of that of another joint, plus an offset.
+
+    Attributes
+    ----------
+    joint : number of the other joint, from 0.
+    multiplier, offset : rad/rad and rad; m for prismatic joints.
+    """
+
+    joint: int
+    multiplier: float
+    offset: float
+
+
+def find_followed_joint(robot: Robot, number: int) -> Follower | None:
+    """Find the joint that a joint of the chain, counted from 0, follows; None if it leads
+    or follows several joints."""
+    commands = np.flatnonzero(robot.reported_matrix[number])
+    if number in robot.leading_joints or len(commands) != 1:
+        return None
+    for joint in robot.leading_joints.tolist():
+        factors = robot.reported_matrix[joint]
+        if np.array_equal(np.flatnonzero(factors), commands):
+            command = commands[0]
+            multiplier = float(
+                robot.reported_matrix[number, command] / factors[command]
+            )
+            offset = robot.reported_offset[number]
+            offset -= multiplier * robot.reported_offset[joint]
+            return Follower(joint, multiplier, float(offset))
+    return None
+
+
+def _add_mimic(joint: ElementTree.Element, name: str, follower: Follower) -> None:
+    """Let a joint follow the joint with a name."""
+    ElementTree.SubElement(
+        joint,
+        "mimic",
+        joint=name,
+        multiplier=repr(follower.multiplier),
+        offset=repr(follower.offset),
+    )
 
 
 def _add_link(root: ElementTree.Element, name: str, mass: Mass | None) -> str:

@@ -287,7 +287,7 @@ def _arrange(
     targets : names of the targets, in the order of positions (N, T, 3).
     """
     angles = check_array(
-        _SOURCE, "joint_angles", arrays["joint_angles"], (None, robot.joints)
+        _SOURCE, "joint_angles", arrays["joint_angles"], (None, robot.commands)
     )
     count = len(angles)
     positions = _check_targets("positions", arrays["positions"], count, targets)
@@ -334,7 +334,7 @@ def _check_wrenches(values: ArrayLike | None, count: int) -> np.ndarray:
 
 def _name_angles(robot: Robot) -> list[str]:
     """Names of the columns with the joint angles of a robot."""
-    return [f"q{joint}" for joint in range(1, robot.joints + 1)]
+    return [f"q{joint}" for joint in range(1, robot.commands + 1)]
 
 
 def _name_columns(names: Iterable[str], values: np.ndarray) -> dict[str, np.ndarray]:
@@ -344,7 +344,7 @@ def _name_columns(names: Iterable[str], values: np.ndarray) -> dict[str, np.ndar
 
 def _make_table(rows: _Rows, robot: Robot) -> Cells:
     """Make the table of measurements, whose messages name arguments and their rows."""
-    described = describe_columns(robot.joints)
+    described = describe_columns(robot.commands)
     for name in rows.columns:
         if name not in described:
             allowed = suggest_names(name, sorted(described))

@@ -151,7 +151,7 @@ class CorrectedRobot:
             wanted = read_target_path_for(path, self.nominal)
             source = str(path)
         else:
-            wanted = _arrange_path(path, self.nominal.joints)
+            wanted = _arrange_path(path, self.nominal.commands)
         return correct_path(
             self.calibrated,
             wanted,
@@ -216,7 +216,7 @@ class CorrectedRobot:
             _check_tolerance("verify", tolerance_m, accepted_risk)
         campaign_targets = [*get_targets(self.calibrated).values()]
         reflectors = list_reflectors(campaign_targets, self.nominal, "verify")
-        joints = self.nominal.joints
+        joints = self.nominal.commands
         if isinstance(targets, (str, Path)):
             corrected = read_corrected_targets(targets, joints)
         else:
@@ -321,7 +321,7 @@ class CorrectedRobot:
         self, joint_angles: ArrayLike, wrenches: ArrayLike | None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Check the shapes of commands and loads."""
-        shape = (None, self.nominal.joints)
+        shape = (None, self.nominal.commands)
         angles = check_array(_SOURCE, "joint_angles", joint_angles, shape)
         if wrenches is None:
             return angles, np.zeros((len(angles), 6))

@@ -100,7 +100,7 @@ def read_verification(
     lengths : unit of lengths whose header states none; None for metres.
     """
     robot = campaign.robot
-    targets = read_corrected_targets(targets_path, robot.joints)
+    targets = read_corrected_targets(targets_path, robot.commands)
     names = list_reflectors(campaign.targets, robot, path)
     measured = read_target_measurements(path, targets, robot, names, lengths or "m")
     return targets, measured
@@ -436,13 +436,13 @@ def join_measurements(
         # The robot file comes first, because a folder with a campaign.yaml needs it.
         with write_together(output, [_ROBOT]) as partial:
             write_text(partial / _ROBOT, read_text(folder.robot_file, LARGEST_BYTES))
-    write_campaign(output, document, table, campaign.robot.joints, kind="csv")
+    write_campaign(output, document, table, campaign.robot.commands, kind="csv")
     return remarks
 
 
 def _read_columns(folder: CampaignFolder) -> dict[str, np.ndarray]:
     """Read the columns of a campaign's measurements as they are in its file."""
-    joints = folder.robot.joints
+    joints = folder.robot.commands
     plan = parse_measuring(folder.document, folder.source)
     cells = read_measurements(folder.path, joints, list_required_columns(plan))
     unread = () if plan.has_orientations else ROTATION

@@ -100,9 +100,10 @@ class Robot:
     joint_limits : (n, 2) array
         Rad, of prismatic joints m; one turn either way if they are not known.
     links : elastic links of the extended model; empty for the reduced model
-    reported_matrix, reported_offset : (n, n) and (n,) arrays
-        Joint angles from those that the controller reports: q = matrix @ reported +
-        offset (rad).
+    reported_matrix, reported_offset : (n, m) and (n,) arrays
+        Joint angles from the m that the controller reports: q = matrix @ reported +
+        offset (rad). There are fewer reported angles than joints, m < n, if joints of
+        the chain follow others, such as the mimic joints of a URDF.
     masses : in the order of the links; empty if none are known
     gravity_m_s2 : base axes
     gear_ratio : tuple, optional
@@ -110,6 +111,8 @@ class Robot:
     compensator : gravity compensator, if there is one
     payload_kg : rated load, if it is known
     joint_names : names of the joints elsewhere, such as in the robot's URDF file
+    stated_command_names : names of the m reported joints, if they are not those of the
+        joints
     compliance_known : bool
         Whether the compliances belong to the robot. If not, they are the scale of
         compliances to identify, see `estimate_typical_compliance`.
@@ -128,24 +131,105 @@ class Robot:
     compensator: Compensator | None = None
     payload_kg: float | None = None
     joint_names: tuple[str, ...] | None = None
+    stated_command_names: tuple[str, ...] | None = None
     compliance_known: bool = True
 
     @property
     def joints(self) -> int:
-        """Number of joints."""
+        """Number of joints of the chain."""
         return self.chain.coordinates
 
+    @property
+    def commands(self) -> int:
+        """Number of joint angles that the controller reports and is commanded."""
+        return int(self.reported_matrix.shape[1])
+
+    @property
+    def has_followers(self) -> bool:
+        """Whether joints of the chain follow others, and have no command of their
+        own."""
+        return self.commands < self.joints
+
+    @property
+    def command_names(self) -> tuple[str, ...] | None:
+        """Names of the reported joints, if they are known."""
+        if self.has_followers or self.stated_command_names:
+            return self.stated_command_names
+        return self.joint_names
+
+    @property
+    def leading_joints(self) -> np.ndarray:
+        """Indices of m joints of the chain whose angles determine those of all joints,
+        ndarray (m,) of int: the first ones that do. All joints lead unless some follow.
+        """
+        leading: list[int] = []
+        for joint in range(self.joints):
+            rows = self.reported_matrix[[*leading, joint]]
+            if not self.has_followers or np.linalg.matrix_rank(rows) == len(rows):
+                leading.append(joint)
+        return np.array(leading)
+
+    @property
+    def is_coupled(self) -> np.ndarray:
+        """Whether a joint follows others or is followed, (n,) bool array. Such a joint
+        has no copies whole turns away, because the others would move with it."""
+        if not self.has_followers:
+            return np.zeros(self.joints, bool)
+        moves = self.reported_matrix != 0.0
+        has_one_command = moves.sum(axis=1) == 1
+        moves_one_joint = moves.sum(axis=0) == 1
+        moves_alone = (moves & moves_one_joint).any(axis=1)
+        return ~(has_one_command & moves_alone)
+
+    def restrict_jacobians(self, jacobian: np.ndarray) -> np.ndarray:
+        """Restrict Jacobians (..., 6, n) of the chain to motions that commands can
+        bring about: their columns belong to orthonormal directions of such motions,
+        (..., 6, m). Nothing changes unless joints follow others."""
+        if not self.has_followers:
+            return jacobian
+        return jacobian @ self._motions
+
+    def expand_steps(self, steps: np.ndarray) -> np.ndarray:
+        """Expand steps (..., m) along the directions of `restrict_jacobians` to steps
+        of all joints, (..., n)."""
+        if not self.has_followers:
+            return steps
+        return steps @ self._motions.T
+
+    @property
+    def _motions(self) -> np.ndarray:
+        """Orthonormal directions of the motions that commands bring about, (n, m)
+        array."""
+        return np.linalg.qr(self.reported_matrix)[0]
+
+    def spread_angles(self, shares: np.ndarray, limits: np.ndarray) -> np.ndarray:
+        """Find the joint angles (N, n) of the chain whose leading joints are at shares
+        (N, m) of limits (n, 2), rad. Joints that follow may be beyond theirs."""
+        leading = self.leading_joints
+        low, high = limits[leading].T
+        angles = low + (high - low) * shares
+        if not self.has_followers:
+            return angles
+        shifted = angles - self.reported_offset[leading]
+        reported = np.linalg.solve(self.reported_matrix[leading], shifted.T).T
+        return self.model_angles(reported)
+
     def model_angles(self, reported: np.ndarray) -> np.ndarray:
-        """Convert joint angles (..., n) that the controller reports to those of the
-        chain, rad."""
+        """Convert joint angles (..., m) that the controller reports to those of the
+        chain (..., n), rad."""
         return reported @ self.reported_matrix.T + self.reported_offset
 
     def reported_angles(self, angles: np.ndarray) -> np.ndarray:
-        """Convert joint angles (N, n) of the chain to those that the controller
-        reports, rad."""
-        return np.linalg.solve(
-            self.reported_matrix, (angles - self.reported_offset).T
-        ).T
+        """Convert joint angles (N, n) of the chain to those (N, m) that the controller
+        reports, rad.
+
+        If joints follow others, only `angles` that they can reach together have a
+        command; for others it is that of the nearest ones.
+        """
+        shifted = angles - self.reported_offset
+        if self.has_followers:
+            return shifted @ np.linalg.pinv(self.reported_matrix).T
+        return np.linalg.solve(self.reported_matrix, shifted.T).T
 
 
 def set_target_offset(robot: Robot, offset_m: Sequence[float]) -> Robot:

@@ -110,6 +110,7 @@ def parse_robot(document: Mapping[str, Any], source: str = "robot") -> Robot:
         compensator=compensator,
         payload_kg=payload_kg,
         joint_names=_get_joint_entries(document, "joint_names", n, source),
+        stated_command_names=_parse_command_names(document, matrix, source),
         compliance_known=stated is not None,
     )
 
@@ -131,11 +132,15 @@ def describe_robot(robot: Robot) -> dict[str, Any]:
     if robot.compliance_known:
         document["compliance_urad_per_Nm"] = (1e6 * robot.compliance).tolist()
     matrix = robot.reported_matrix
-    if (matrix != np.eye(robot.joints)).any() or robot.reported_offset.any():
+    is_identity = np.array_equal(matrix, np.eye(robot.joints))
+    if not is_identity or robot.reported_offset.any():
         document["reported_joints"] = {
             "matrix": matrix.tolist(),
             "offset_deg": (robot.reported_offset / units).tolist(),
         }
+    if robot.stated_command_names is not None:
+        reported = document.setdefault("reported_joints", {})
+        reported["names"] = list(robot.stated_command_names)
     if robot.masses:
         document["masses"] = [
             vars(mass) | {"centre_m": list(mass.centre_m)} for mass in robot.masses
@@ -211,14 +216,42 @@ def _parse_reported_joints(
     """Return the matrix and offset of reported joint angles, see `Robot`."""
     n = chain.coordinates
     reported = document.get("reported_joints", {})
-    matrix = reported.get("matrix", np.eye(n).tolist())
+    rows = reported.get("matrix", np.eye(n).tolist())
     offset = reported.get("offset_deg", [0.0] * n)
-    widths = [len(row) for row in matrix]
-    if widths != [n] * n or len(offset) != n:
-        shape = f"rows of {widths} and {format_count(len(offset), 'offset')}"
-        allowed = f"{n} rows of {n} numbers and {n} offsets"
+    widths = {len(row) for row in rows}
+    if (
+        len(rows) != n
+        or len(widths) != 1
+        or len(offset) != n
+        or not 0 < max(widths) <= n
+    ):
+        lengths = [len(row) for row in rows]
+        shape = f"rows of {lengths} and {format_count(len(offset), 'offset')}"
+        allowed = (
+            f"{n} rows, each of the same count of numbers up to {n}, and {n} offsets"
+        )
         raise InputError(source, "reported_joints", shape, allowed)
-    return np.array(matrix, float), np.array(offset, float) * _units(chain)
+    matrix = np.array(rows, float)
+    commands = matrix.shape[1]
+    if np.linalg.matrix_rank(matrix) < commands:
+        problem = "a matrix by which several reported angles mean the same pose"
+        allowed = "independent columns: no reported joint without one of its own"
+        raise InputError(source, "reported_joints", problem, allowed)
+    return matrix, np.array(offset, float) * _units(chain)
+
+
+def _parse_command_names(
+    document: Mapping[str, Any], matrix: np.ndarray, source: str
+) -> tuple[str, ...] | None:
+    """Return the names of reported joints, None without them."""
+    names = document.get("reported_joints", {}).get("names")
+    if names is None:
+        return None
+    if len(names) != matrix.shape[1]:
+        count = format_count(len(names), "name")
+        allowed = f"one for each of the {matrix.shape[1]} reported joints"
+        raise InputError(source, "reported_joints.names", count, allowed)
+    return tuple(names)
 
 
 def _parse_masses(

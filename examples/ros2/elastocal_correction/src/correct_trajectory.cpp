@@ -23,10 +23,10 @@ class CorrectTrajectory : public rclcpp::Node {
         model_(elastocal::Model::load(declare_parameter<std::string>("model"))),
         workspace_(model_),
         joint_names_(
-            declare_parameter<std::vector<std::string>>("joint_names", model_.joint_names())),
+            declare_parameter<std::vector<std::string>>("joint_names", model_.command_names())),
         allow_extrapolation_(declare_parameter<bool>("allow_extrapolation", false)) {
-    if (joint_names_.size() != model_.joints())
-      throw std::runtime_error("joint_names: a name for each joint of the model is needed");
+    if (joint_names_.size() != model_.commands())
+      throw std::runtime_error("joint_names: a name for each commanded joint is needed");
     corrected_ = create_publisher<JointTrajectory>("trajectory_out", rclcpp::QoS(1));
     planned_ = create_subscription<JointTrajectory>(
         "trajectory_in", rclcpp::QoS(1),
@@ -54,7 +54,7 @@ class CorrectTrajectory : public rclcpp::Node {
         RCLCPP_ERROR(get_logger(), "point %zu: not a position for each joint", number);
         return;
       }
-      std::vector<double> command(model_.joints());
+      std::vector<double> command(model_.commands());
       for (std::size_t joint = 0; joint < command.size(); ++joint)
         command[joint] = positions[(*columns)[joint]];
       const elastocal::Pose wanted = model_.rigid(command, workspace_);

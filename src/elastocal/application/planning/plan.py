@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.application.inverse_kinematics import find_beyond_limits
 from elastocal.application.planning.cell import check_configurations
 from elastocal.application.planning.designs import (
     Criterion,
@@ -112,10 +113,11 @@ def find_allowed_candidates(
     from scipy.stats import qmc
 
     robot = survey.robot
-    low, high = robot.joint_limits.T
-    halton = qmc.Halton(robot.joints, seed=seed)
+    halton = qmc.Halton(robot.commands, seed=seed)
     shares = halton.random(_DRAWS_PER_CANDIDATE * count)
-    reported = robot.reported_angles(low + (high - low) * shares)
+    angles = robot.spread_angles(shares, robot.joint_limits)
+    angles = angles[~find_beyond_limits(robot, angles).any(axis=1)]
+    reported = robot.reported_angles(angles)
     checks = check_configurations(cell, robot, survey.targets, reported)
     allowed = np.flatnonzero(np.all(list(checks.values()), axis=0))[:count]
     if not len(allowed):
