@@ -72,9 +72,9 @@ def read_board_poses(
         poses = replace(poses, angles=joint_angles.angles[rows])
     elif poses.angles is not None and options.angles == "deg":
         poses = replace(poses, angles=np.radians(poses.angles))
-    if poses.angles is not None and poses.angles.shape[1] != robot.joints:
+    if poses.angles is not None and poses.angles.shape[1] != robot.commands:
         found = f"{poses.angles.shape[1]} joint angles in a sample"
-        raise InputError(path, "", found, f"{robot.joints}, as the robot has joints")
+        raise InputError(path, "", found, f"{robot.commands}, as the robot reports")
     return poses
 
 

@@ -65,12 +65,12 @@ def read_joint_angles(
 
     def is_header(cells: Sequence[str]) -> bool:
         names = {recognize_column(cell)[0] for cell in cells} - {None}
-        named = {*cells} >= {*(robot.joint_names or ("",))}
+        named = {*cells} >= {*(robot.command_names or ("",))}
         return named or bool(find_joints(name for name in names if name))
 
     text = read_text_table(path, is_header, wanted=_HEADER, units_in=read_units)
     columns, stated_units = find_columns(text, {}, robot)
-    wanted = [f"q{joint}" for joint in range(1, robot.joints + 1)]
+    wanted = [f"q{joint}" for joint in range(1, robot.commands + 1)]
     missing = [name for name in wanted if name not in columns]
     if missing:
         raise InputError(path, "header", f"no column {missing[0]!r}", _HEADER)
@@ -86,7 +86,7 @@ def read_joint_angles(
 def _read_joint_states(document: Any, path: str | Path, robot: Robot) -> np.ndarray:
     """Read the joint states that MoveIt's hand-eye calibration saves; they are in rad
     and have the names of the joints."""
-    allowed = f"joint_names, and joint_values with {robot.joints} numbers in rad each"
+    allowed = f"joint_names, and joint_values with {robot.commands} numbers in rad each"
     try:
         values = np.asarray(document["joint_values"], float)
         names = [*document["joint_names"]]
@@ -94,9 +94,9 @@ def _read_joint_states(document: Any, path: str | Path, robot: Robot) -> np.ndar
         raise InputError(path, "", "no joint states of MoveIt", allowed) from None
     if values.ndim != 2 or values.shape[1] != len(names):
         raise InputError(path, "joint_values", f"an array {values.shape}", allowed)
-    order = [*(robot.joint_names or ())]
+    order = [*(robot.command_names or ())]
     if set(order) <= set(names) and order:
         return values[:, [names.index(name) for name in order]]
-    if len(names) != robot.joints:
+    if len(names) != robot.commands:
         raise InputError(path, "joint_names", f"{len(names)} joints", allowed)
     return values

@@ -172,9 +172,8 @@ def summarize_import(imported: ImportedRobot) -> list[str]:
     prismatic = sum(robot.chain.prismatic)
     if prismatic:
         joints += f", {prismatic} of them prismatic"
-    followers = robot.joints - robot.commands
-    if followers:
-        joints += f", {followers} of them follow others"
+    if robot.has_followers:
+        joints += f", {robot.commands} of them commanded"
     length = math.fsum(
         abs(transform.constant)
         for transform in robot.chain.transforms

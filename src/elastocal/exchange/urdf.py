@@ -215,14 +215,16 @@ def robot_from_urdf(
     joints = ", ".join(
         f"q{number} from {joint.name!r}" for number, joint in enumerate(chain.joints, 1)
     )
-    notes = [f"read: {joints}", *mass_notes]
+    has_followers = any(joint.mimic for joint in chain.joints)
+    reading = "read as joints of the chain" if has_followers else "read"
+    notes = [f"{reading}: {joints}", *mass_notes]
     document: dict[str, Any] = {
         "name": urdf.name,
         "joint_names": [joint.name for joint in chain.joints],
         "chain": chain.notation,
         "joint_limits_deg": [_convert_limits(joint, source) for joint in chain.joints],
     }
-    if any(joint.mimic for joint in chain.joints):
+    if has_followers:
         document["reported_joints"] = _describe_commands(chain)
         notes.append(_describe_followers(chain))
     notes += _note_missing_limits(chain.joints)
