@@ -32,7 +32,7 @@ def test_what_remains_starts_another_round():
     facts = collect_verification_facts(make_verification(remains=True))
     assert "0.080 mm RMS remains" in facts["remaining"] and "--with" in facts["now"]
     facts = collect_verification_facts(make_verification())
-    assert "Nothing repeatable remains" in facts["remaining"]
+    assert "No repeatable error is detected" in facts["remaining"]
 
 
 def test_errors_are_stated_with_level_power_and_frame():
