@@ -6,7 +6,6 @@ import pytest
 from support import refused
 
 from elastocal.campaigns.socket_recordings import (
-    SOCKET_DISTANCE_M,
     Recording,
     describe_sockets,
     find_recordings,
@@ -34,13 +33,22 @@ def test_a_folder_of_places_becomes_a_session_for_each_place(tmp_path):
     assert table["session"].tolist() == [0, 1, 1, 1]
     assert table["pose"].tolist() == [0, 1, 2, 3]
     np.testing.assert_array_equal(table["q1"], [0.7, 0.1, 0.3, 0.5])
-    d = SOCKET_DISTANCE_M
-    np.testing.assert_array_equal(table["x"], [d, 0, 0, d])
+    assert table["feature"].tolist() == ["hole_1", "hole_0", "hole_0", "hole_1"]
     assert set(table["target"]) == {"ball"}
 
 
-def test_the_document_of_recordings_is_a_valid_campaign():
-    check_document(describe_sockets("mine", "panda", 7), "campaign", "campaign.yaml")
+@pytest.mark.parametrize("sockets", [1, 2, 3])
+def test_the_document_of_recordings_is_a_valid_campaign(sockets):
+    recordings = [
+        Recording("front", socket, np.zeros((2, 7))) for socket in range(sockets)
+    ]
+    document = describe_sockets("mine", "panda", recordings, 0.06)
+    check_document(document, "campaign", "campaign.yaml")
+    assert len(document["features"]) == sockets
+    if sockets == 2:
+        assert document["distances"][0]["distance_m"] == 0.06
+    if sockets == 3:
+        assert document["features"]["hole_2"]["position_m"] == [0.12, 0.0, 0.0]
 
 
 @pytest.mark.parametrize(

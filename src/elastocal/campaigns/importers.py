@@ -379,9 +379,9 @@ class SocketImporter(Importer):
         """Write files of one robot as a campaign's folder, each folder of them as a
         session; see `Importer.write_campaign`."""
         recordings = [read_recording(path) for path in paths]
-        table = tabulate_recordings(recordings, self.distance_m)
+        table = tabulate_recordings(recordings)
         joints = recordings[0].angles.shape[1]
-        document = describe_sockets(name, self.robots[0], joints)
+        document = describe_sockets(name, self.robots[0], recordings, self.distance_m)
         document |= {key: dict(value) for key, value in test.items()}
         write_campaign(folder, document, table, joints)
 

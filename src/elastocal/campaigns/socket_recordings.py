@@ -2,7 +2,7 @@
 
 This is the format of MUKCa [1]_: a folder for each place where the printed tool stood,
 with a file of joint angles for each of its sockets. Nothing else is measured. Each place
-has a frame of its own, with the first socket in its origin and the others on its x axis.
+is a session; a socket is a point that the ball touches, at a known distance from the next.
 
 References
 ----------
@@ -25,6 +25,8 @@ from elastocal.errors import InputError
 # Distance of neighbouring sockets of the tool that MUKCa prints.
 SOCKET_DISTANCE_M = 0.05
 TARGET = "ball"
+# What the makers of the tool measure of its printed distance with a caliper.
+DISTANCE_STD_M = 1.0e-4
 # Play of a printed ball in a printed socket; MUKCa reports 0.1 mm of repeatability.
 SOCKET_STD_M = 1.0e-4
 # Name of a file of joint angles, with the number of its socket.
@@ -89,47 +91,65 @@ def find_recordings(folder: str | Path) -> list[Path]:
     return paths
 
 
-def describe_sockets(name: str, robot: str, joints: int) -> dict[str, Any]:
+def describe_sockets(
+    name: str,
+    robot: str,
+    recordings: Sequence[Recording],
+    distance_m: float = SOCKET_DISTANCE_M,
+) -> dict[str, Any]:
     """Return ``campaign.yaml`` of recordings.
 
     Parameters
     ----------
     name : name of the campaign.
     robot : as in ``campaign.yaml``.
-    joints : number of joints; the ball sits behind the last one.
+    recordings : all sockets of all places; the ball sits behind the last joint.
+    distance_m : distance between the centres of neighbouring sockets.
     """
-    return {
+    joints = recordings[0].angles.shape[1]
+    sockets = sorted({recording.socket for recording in recordings})
+    document = {
         "campaign": name,
         "robot": robot,
-        "measured": "position",
-        "frame": "tracker",
+        "measured": "point",
+        "frame": "unknown",
         "targets": {TARGET: {"point": f"{joints}DoF", "offset_m": "unknown"}},
+        "features": {name_socket(socket): {} for socket in sockets},
         "compliance": "nominal",
         "declared": ["joint_offset", "link_geometry"],
         "noise": {"position_m": SOCKET_STD_M},
         "holdout": {"fraction": 0.3, "seed": 1},
     }
+    if len(sockets) == 2:
+        distance = {
+            "between": [name_socket(socket) for socket in sockets],
+            "distance_m": distance_m * (sockets[1] - sockets[0]),
+            "std_m": DISTANCE_STD_M,
+        }
+        document["distances"] = [distance]
+    elif len(sockets) > 2:
+        for socket in sockets:
+            place_m = [distance_m * socket, 0.0, 0.0]
+            feature = {"position_m": place_m, "std_m": DISTANCE_STD_M}
+            document["features"][name_socket(socket)] = feature
+    return document
 
 
-def tabulate_recordings(
-    recordings: Sequence[Recording], distance_m: float = SOCKET_DISTANCE_M
-) -> dict[str, np.ndarray]:
+def name_socket(socket: int) -> str:
+    """Return the name of a socket among the features of a campaign."""
+    return f"hole_{socket}"
+
+
+def tabulate_recordings(recordings: Sequence[Recording]) -> dict[str, np.ndarray]:
     """Return the columns of ``measurements.csv``, one row for each recorded pose.
 
-    Parameters
-    ----------
-    recordings : all sockets of all places; a place is one session.
-    distance_m : distance between the centres of neighbouring sockets.
-
-    Raises
-    ------
-    InputError
-        If recordings have different numbers of joints, or a place has one socket twice.
+    A place is one session. Raises `InputError`: recordings have different numbers of
+    joints, or a place has one socket twice.
     """
     joints = recordings[0].angles.shape[1]
     places = list(dict.fromkeys(recording.place for recording in recordings))
     seen = set()
-    columns: dict[str, list[np.ndarray]] = {"session": [], "x": [], "angles": []}
+    columns: dict[str, list[np.ndarray]] = {"session": [], "feature": [], "angles": []}
     for recording in recordings:
         label = (recording.place, recording.socket)
         source = f"{recording.place}/hole_{recording.socket}.csv"
@@ -141,7 +161,7 @@ def tabulate_recordings(
         seen.add(label)
         count = len(recording.angles)
         columns["session"].append(np.full(count, places.index(recording.place)))
-        columns["x"].append(np.full(count, recording.socket * distance_m))
+        columns["feature"].append(np.full(count, name_socket(recording.socket)))
         columns["angles"].append(recording.angles)
     angles = np.concatenate(columns["angles"])
     poses = np.arange(len(angles))
@@ -153,5 +173,4 @@ def tabulate_recordings(
         "target": np.full(len(poses), TARGET),
     }
     table |= {f"q{joint}": column for joint, column in enumerate(angles.T, 1)}
-    zeros = np.zeros(len(poses))
-    return table | {"x": np.concatenate(columns["x"]), "y": zeros, "z": zeros}
+    return table | {"feature": np.concatenate(columns["feature"])}

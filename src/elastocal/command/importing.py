@@ -318,8 +318,8 @@ def sockets(
     arm = _read_robot_for(folder, robot, force=force)
     paths = find_recordings(recordings)
     files = [read_recording(path) for path in paths]
-    table = tabulate_recordings(files, distance)
-    document = describe_sockets(folder.resolve().name, _ROBOT_FILE, arm.joints)
+    table = tabulate_recordings(files)
+    document = describe_sockets(folder.resolve().name, _ROBOT_FILE, files, distance)
     places = len({recording.place for recording in files})
     size = (
         f"{format_count(len(table['pose']), 'pose')} in {format_count(len(paths), 'socket')}"

@@ -1,8 +1,8 @@
 """Poses of a board in a camera, as programs for hand-eye calibration save them, and the
 measurements of a campaign that they are.
 
-A camera on the robot is a target in the frame of the board; a board on the robot is a
-target in the frame of the camera.
+With the camera on the robot the target is the camera; with the board on the robot it is the
+board. A row has the pose of the board in the camera in either case.
 """
 
 from __future__ import annotations
@@ -83,7 +83,8 @@ def check_poses(poses: BoardPoses) -> None:
 
 
 def tabulate_board_poses(poses: BoardPoses, camera: str) -> dict[str, np.ndarray]:
-    """Return the columns of ``measurements.csv``, one row for each pose.
+    """Return the columns of ``measurements.csv``, one row for each pose of the board in
+    the camera.
 
     Parameters
     ----------
@@ -93,11 +94,7 @@ def tabulate_board_poses(poses: BoardPoses, camera: str) -> dict[str, np.ndarray
     if poses.angles is None:
         allowed = "--joints FILE: a table with q1, q2 and so on, a row for each sample"
         raise InputError(poses.source, "", "no joint angles", allowed)
-    position, rotation = poses.position, poses.rotation
-    if camera == ON_ROBOT:
-        rotation = rotation.transpose(0, 2, 1)
-        position = -(rotation @ position[..., None])[..., 0]
-    number = np.arange(len(position))
+    number = np.arange(len(poses.position))
     table = {
         "pose": number,
         "load": 0 * number,
@@ -105,8 +102,8 @@ def tabulate_board_poses(poses: BoardPoses, camera: str) -> dict[str, np.ndarray
         "target": np.full(len(number), name_target(camera)),
     }
     table |= {f"q{joint}": angle for joint, angle in enumerate(poses.angles.T, 1)}
-    table |= dict(zip(("x", "y", "z"), position.T, strict=True))
-    vector = Rotation.from_matrix(rotation).as_rotvec()
+    table |= dict(zip(("x", "y", "z"), poses.position.T, strict=True))
+    vector = Rotation.from_matrix(poses.rotation).as_rotvec()
     return table | dict(zip(("rx", "ry", "rz"), vector.T, strict=True))
 
 
@@ -126,8 +123,9 @@ def describe_board_campaign(
     return {
         "campaign": name,
         "robot": "robot.yaml",
-        "measured": "pose",
-        "frame": "tracker",
+        "measured": "board",
+        "camera": camera.replace("-", "_"),
+        "frame": "unknown",
         "targets": {name_target(camera): mount},
         "compliance": "nominal",
         "declared": ["joint_offset", "link_geometry"],
