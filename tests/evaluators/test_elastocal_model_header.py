@@ -29,9 +29,9 @@ from elastocal.application.compensation import find_joint_targets
 HEADERS = Path(evaluators.__file__).parent
 SOURCE = Path(__file__).with_name("evaluate.cpp")
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror")
-# Bound on the cost of a corrected target, in predictions; some four were measured, and
-# each step of Newton's method that is added costs one.
-MOST_PREDICTIONS = 5.0
+# Bounds on the cost of a corrected target, in predictions: three and five were measured,
+# four and more than six before steps foresaw what their loads displace.
+MOST_PREDICTIONS = {"kuka": 4.0, "gen3": 6.0}
 
 
 @pytest.fixture(scope="session")
@@ -123,14 +123,15 @@ def test_commands_beyond_the_campaign_are_those_of_the_package(program, tmp_path
 
 
 @pytest.mark.slow
-def test_a_corrected_target_costs_a_few_predictions(program, tmp_path):
+@pytest.mark.parametrize("name", MOST_PREDICTIONS)
+def test_a_corrected_target_costs_a_few_predictions(program, name, tmp_path):
     """With every kind of effect; both are timed in one run."""
-    calibrated = make_calibrated("kuka")
+    calibrated = make_calibrated(name)
     path = write_made_model(tmp_path / "arm.json", calibrated)
     commands, wrench = draw_commands(calibrated)
     pose = compute_nominal_poses(calibrated.robot, commands)
     correction_us, prediction_us = program(path, "time", commands, wrench, *pose)
-    assert correction_us <= MOST_PREDICTIONS * prediction_us
+    assert correction_us <= MOST_PREDICTIONS[name] * prediction_us
 
 
 @pytest.mark.parametrize(

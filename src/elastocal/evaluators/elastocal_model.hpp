@@ -59,6 +59,17 @@ inline double dot(const Vector3& a, const Vector3& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
+// Written out, because compilers do not unroll loops at -O2.
+inline Vector3 scaled(const Vector3& vector, double factor) {
+  return {factor * vector[0], factor * vector[1], factor * vector[2]};
+}
+
+inline void add_scaled(Vector3& sum, const Vector3& vector, double factor) {
+  sum[0] += factor * vector[0];
+  sum[1] += factor * vector[1];
+  sum[2] += factor * vector[2];
+}
+
 inline double norm(const double* first) {
   return std::sqrt(first[0] * first[0] + first[1] * first[1] + first[2] * first[2]);
 }
@@ -230,15 +241,13 @@ struct Frame {
 
   Vector3 place(const Vector3& local) const {
     Vector3 point = origin;
-    for (int axis = 0; axis < 3; ++axis)
-      for (int i = 0; i < 3; ++i) point[i] += local[axis] * axes[axis][i];
+    add_scaled(point, axes[0], local[0]);
+    add_scaled(point, axes[1], local[1]);
+    add_scaled(point, axes[2], local[2]);
     return point;
   }
   void shift(int axis, double amount) {
-    const Vector3& direction = axes[static_cast<std::size_t>(axis)];
-    origin[0] += amount * direction[0];
-    origin[1] += amount * direction[1];
-    origin[2] += amount * direction[2];
+    add_scaled(origin, axes[static_cast<std::size_t>(axis)], amount);
   }
   void turn(int axis, double cosine, double sine) {
     switch (axis) {
@@ -316,6 +325,8 @@ struct Term {
   double threshold = 1.0;
   int weighed_joint = -1;
   Body body;
+  // Its factors but that of the angles and a limit.
+  std::vector<std::size_t> factors;
 
   // Add a term with the same factors but value and weight; false if it has others.
   bool merge(const Term& other) {
@@ -338,19 +349,57 @@ struct Term {
   }
 };
 
+// The weight of a body as a load on a joint.
+struct Weight {
+  std::size_t joint = 0;
+  Body body;
+};
+
+// A term whose only factor besides that of the angles is a load, in little memory.
+struct LinearTerm {
+  std::size_t number, coordinate, load;
+};
+
 // The terms of a model by what they depend on.
 struct Terms {
   std::vector<Term> all;
   // On angles alone, on one load as well, and on anything else.
-  std::vector<std::size_t> fixed, linear, others;
+  std::vector<std::size_t> fixed, others;
+  std::vector<LinearTerm> linear;
+  // Those whose factor changes with the angles; most springs are constant.
+  std::vector<std::size_t> varying;
 
   void add(const Term& term) {
     for (Term& known : all)
       if (known.merge(term)) return;
-    const bool is_plain = term.limit == Limit::none && term.weighed_joint < 0;
-    auto& list = !is_plain || term.loads.size() > 1 ? others : term.loads.empty() ? fixed : linear;
-    list.push_back(all.size());
     all.push_back(term);
+  }
+
+  // Sort the terms, and list the weights that are loads besides those of the coordinates.
+  void arrange(std::size_t coordinates, std::vector<Weight>& weights) {
+    for (std::size_t number = 0; number < all.size(); ++number) {
+      Term& term = all[number];
+      term.factors.assign(term.loads.begin(), term.loads.end());
+      if (term.weighed_joint >= 0) {
+        term.factors.push_back(coordinates + weights.size());
+        weights.push_back({static_cast<std::size_t>(term.weighed_joint), term.body});
+      }
+      if (term.limit != Limit::none || term.factors.size() > 1)
+        others.push_back(number);
+      else if (term.factors.empty())
+        fixed.push_back(number);
+      else
+        linear.push_back(
+            {number, static_cast<std::size_t>(term.coordinate), term.factors.front()});
+      if (term.phase >= 0 || !term.angles.empty()) varying.push_back(number);
+    }
+  }
+
+  // The values of all terms, which are the factors of those that no angle changes.
+  std::vector<double> values() const {
+    std::vector<double> values;
+    for (const Term& term : all) values.push_back(term.value);
+    return values;
   }
 };
 
@@ -493,7 +542,11 @@ class Workspace {
   std::vector<double> angles, fixed, coordinates, displacement, loads, factors, series_factors;
   std::vector<double> cosines, sines, multiples, scaled;
   std::vector<detail::Twist> twists;
+  // For each joint what the weight of a body's mass and of its first moment does.
+  std::vector<double> sinkings;
+  std::vector<Vector3> lowerings;
   std::vector<detail::Frame> frames;
+  std::vector<std::array<double, 6>> directions, jacobian;
   detail::Frame end;
 };
 
@@ -555,18 +608,25 @@ class Model {
     if (commands_ < 6) throw std::invalid_argument("correct needs six joints or more");
     set_angles(start, workspace);
     walk(workspace, true);
-    Jacobian jacobian = compute_jacobian(workspace);
-    const Jacobian directions = restrict_to_commands(jacobian);
-    approach(wanted, wrench, directions, jacobian, workspace);
+    compute_jacobian(workspace, workspace.jacobian);
+    workspace.directions = restrict_to_commands(workspace.jacobian);
+    evaluate_loads(wrench, workspace);
     Correction correction;
     Vector3 moved{};
-    for (int step = 0; step < most_steps; ++step) {
-      come_to_rest(wrench, workspace);
-      if (step <= regression_steps) moved = correct_residual(wrench, workspace);
-      const double largest = find_error(wanted, moved, correction.error, workspace);
-      correction.converged = largest < converged_m;
-      if (correction.converged || !take_step(directions, jacobian, correction.error, workspace))
-        break;
+    // What an approach has to add to the wanted pose, so that a prediction reaches it.
+    std::array<double, 6> aim{};
+    for (int rest = 0; rest < most_rests; ++rest) {
+      const bool is_last = rest > 0 && find_largest(correction.error) < settled_m;
+      if (!approach(wanted, aim, wrench, is_last, correction.error, workspace)) break;
+      if (!is_last) {
+        come_to_rest(wrench, workspace);
+        if (rest <= regression_steps) moved = correct_residual(wrench, workspace);
+        correction.error = find_error(wanted, workspace);
+        for (std::size_t i = 0; i < 3; ++i) correction.error[i] -= moved[i];
+        for (std::size_t i = 0; i < 6; ++i) aim[i] += correction.error[i];
+      }
+      correction.converged = find_largest(correction.error) < converged_m;
+      if (correction.converged || is_last) break;
     }
     correction.joint_angles = report_angles(workspace.angles);
     return correction;
@@ -576,11 +636,17 @@ class Model {
   friend class Workspace;
   using Jacobian = std::vector<std::array<double, 6>>;
   static constexpr int version = 1;
+  // Steps of one approach, and predictions that check where it has led.
   static constexpr int most_steps = 20;
+  static constexpr int most_rests = 12;
   static constexpr double converged_m = 1e-10;
-  // Pose error below which the loads are evaluated as in a prediction.
+  // Error of a prediction below which no other prediction is needed: the commands change so
+  // little that the difference between a prediction and an approach stays the same.
+  static constexpr double settled_m = 1e-7;
+  // Error of which a step leaves less than the tolerance; each step leaves less than a
+  // hundredth even in soft arms.
   static constexpr double approached_m = 1e-8;
-  // Steps after which a regression is no longer evaluated anew; one with jumps would keep
+  // Predictions after which a regression is no longer evaluated anew; one with jumps would keep
   // later steps from converging.
   static constexpr int regression_steps = 2;
   // Multiples of a joint angle up to this order come from a recurrence.
@@ -595,6 +661,10 @@ class Model {
   std::vector<detail::Transform> transforms_;
   // For each transform whether its coordinate needs a twist, and whether it ever moves.
   std::vector<char> twisted_, moved_;
+  // Coordinates that move.
+  std::vector<std::size_t> moving_;
+  // Whether bodies load the coordinates of links but not the joints.
+  bool weighs_links_ = false;
   // Coordinates whose loads are needed, from the end of the chain to the base.
   std::vector<int> loaded_;
   std::vector<int> index_;
@@ -602,6 +672,7 @@ class Model {
   Vector3 end_offset_{}, gravity_{};
   std::vector<detail::Body> bodies_;
   detail::Terms terms_, series_;
+  std::vector<detail::Weight> weights_;
   std::vector<detail::Phase> phases_;
   // Orders of the phases that are multiples of one angle, else 0, and the largest of each
   // joint.
@@ -777,6 +848,8 @@ class Model {
 
   // Decide which coordinates move, and of which the twists, loads and frames are needed.
   void plan_walk() {
+    terms_.arrange(coordinates_, weights_);
+    series_.arrange(coordinates_, weights_);
     std::vector<char> moves(coordinates_, 0), needs_load(coordinates_, 0),
         needs_twist(coordinates_, 0);
     for (std::size_t joint = 0; joint < joints_; ++joint) moves[joint] = needs_twist[joint] = 1;
@@ -797,9 +870,12 @@ class Model {
       const int coordinate = transform.coordinate;
       const bool is_free = coordinate >= 0;
       const auto k = static_cast<std::size_t>(is_free ? coordinate : 0);
-      twisted_.push_back(is_free && (needs_twist[k] || needs_load[k]));
+      twisted_.push_back(is_free && (moves[k] || needs_twist[k] || needs_load[k]));
       moved_.push_back(!is_free || moves[k]);
     }
+    for (std::size_t k = 0; k < coordinates_; ++k)
+      if (moves[k]) moving_.push_back(k);
+    for (const detail::Body& body : bodies_) weighs_links_ = weighs_links_ || !body.loads_joints;
     for (std::size_t k = 0; k < coordinates_; ++k)
       if (needs_load[k]) loaded_.push_back(static_cast<int>(k));
     std::sort(loaded_.begin(), loaded_.end(), [this](int first, int second) {
@@ -933,7 +1009,7 @@ class Model {
 
   void evaluate_factors(const detail::Terms& terms, std::vector<double>& factors,
                         const Workspace& workspace) const {
-    for (std::size_t number = 0; number < terms.all.size(); ++number) {
+    for (std::size_t number : terms.varying) {
       const detail::Term& term = terms.all[number];
       double factor = term.value;
       if (term.phase >= 0) {
@@ -953,8 +1029,8 @@ class Model {
       if (for_loads && framed_[number]) workspace.frames[number] = frame;
       if (for_loads && twisted_[number]) {
         const auto k = static_cast<std::size_t>(transform.coordinate);
-        Vector3 direction = frame.axes[static_cast<std::size_t>(transform.axis)];
-        for (double& component : direction) component *= transform.sign;
+        const Vector3& axis = frame.axes[static_cast<std::size_t>(transform.axis)];
+        const Vector3 direction = detail::scaled(axis, transform.sign);
         detail::Twist& twist = workspace.twists[k];
         twist.linear = transform.turns ? detail::cross(frame.origin, direction) : direction;
         twist.angular = transform.turns ? direction : Vector3{};
@@ -982,62 +1058,100 @@ class Model {
   void come_to_rest(const Wrench& wrench, Workspace& workspace) const {
     for (int iteration = 0; iteration <= iterations_; ++iteration) {
       walk(workspace, iteration == 0);
-      displace(wrench, workspace);
+      evaluate_loads(wrench, workspace);
+      displace(workspace, workspace.coordinates);
     }
     walk(workspace, false, false);
   }
 
-  // Displace the coordinates by the loads at the pose of the last walk.
-  void displace(const Wrench& wrench, Workspace& workspace) const {
-    evaluate_loads(wrench, workspace);
-    workspace.coordinates = workspace.fixed;
-    add_loaded_terms(terms_, workspace.factors, workspace.coordinates, workspace);
+  // Displace coordinates by the loads of the last evaluation.
+  void displace(Workspace& workspace, std::vector<double>& coordinates) const {
+    coordinates = workspace.fixed;
+    add_loaded_terms(terms_, workspace.factors, coordinates, workspace);
   }
 
-  // Come near a wanted pose by steps whose loads are those at the pose of the step before.
-  void approach(const Pose& wanted, const Wrench& wrench, const Jacobian& directions,
-                Jacobian& jacobian, Workspace& workspace) const {
+  // Come near a wanted pose, moved by an aim. The loads follow from the displaced pose, which
+  // is nearly known, so that each step adds what they will displace to what it corrects.
+  // Predictions evaluate the loads a stated number of times, steps until they no longer
+  // change; the aim contains the difference. The last approach ends with an error that is
+  // evaluated. Return false if the steps lead nowhere.
+  bool approach(const Pose& wanted, const std::array<double, 6>& aim, const Wrench& wrench,
+                bool is_last, std::array<double, 6>& error, Workspace& workspace) const {
     for (int step = 0; step < most_steps; ++step) {
-      displace(wrench, workspace);
+      displace(workspace, workspace.coordinates);
       walk(workspace, false);
-      std::array<double, 6> error{};
-      const double largest = find_error(wanted, {}, error, workspace);
-      if (largest < approached_m) break;
-      jacobian = compute_jacobian(workspace);
-      if (!take_step(directions, jacobian, error, workspace)) break;
+      error = find_error(wanted, workspace);
+      for (std::size_t i = 0; i < 6; ++i) error[i] += aim[i];
+      evaluate_loads(wrench, workspace);
+      displace(workspace, workspace.displacement);
+      subtract_motion(error, workspace);
+      const double largest = find_largest(error);
+      if (is_last && largest < converged_m) return true;
+      compute_jacobian(workspace, workspace.jacobian);
+      if (!take_step(error, workspace)) return false;
+      if (!is_last && largest < approached_m) return true;
     }
+    return false;
   }
 
-  // Wanted less predicted pose at the end of the last walk; return the largest component.
-  double find_error(const Pose& wanted, const Vector3& moved, std::array<double, 6>& error,
-                    const Workspace& workspace) const {
+  // Wanted less predicted pose at the end of the last walk.
+  std::array<double, 6> find_error(const Pose& wanted, const Workspace& workspace) const {
     const Pose reached = get_pose(workspace);
     const Vector3 turn = detail::rotation_vector(wanted.rotation, reached.rotation);
-    double largest = 0.0;
-    for (int i = 0; i < 3; ++i) {
-      error[i] = wanted.position[i] - reached.position[i] - moved[i];
+    std::array<double, 6> error{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      error[i] = wanted.position[i] - reached.position[i];
       error[i + 3] = turn[i];
-      largest = std::max({largest, std::abs(error[i]), std::abs(turn[i])});
     }
+    return error;
+  }
+
+  static double find_largest(const std::array<double, 6>& error) {
+    double largest = 0.0;
+    for (double component : error) largest = std::max(largest, std::abs(component));
     return largest;
+  }
+
+  // Subtract from an error, to first order, the motion of the end effector from the
+  // coordinates of the last walk to the displacements.
+  void subtract_motion(std::array<double, 6>& error, const Workspace& workspace) const {
+    detail::Twist sum;
+    for (std::size_t k : moving_) {
+      const double amount = workspace.displacement[k] - workspace.coordinates[k];
+      const detail::Twist& twist = workspace.twists[k];
+      detail::add_scaled(sum.linear, twist.linear, amount);
+      detail::add_scaled(sum.angular, twist.angular, amount);
+    }
+    const Vector3 lever = detail::cross(sum.angular, workspace.end.place(end_offset_));
+    for (std::size_t i = 0; i < 3; ++i) {
+      error[i] -= sum.linear[i] + lever[i];
+      error[i + 3] -= sum.angular[i];
+    }
   }
 
   // First moment of a body about the base's origin.
   static Vector3 first_moment(const detail::Body& body, const Workspace& workspace) {
     const detail::Frame& frame = workspace.frames[static_cast<std::size_t>(body.after)];
-    Vector3 sum{};
-    for (std::size_t i = 0; i < 3; ++i)
-      sum[i] = body.mass * frame.origin[i] + body.moment[0] * frame.axes[0][i] +
-               body.moment[1] * frame.axes[1][i] + body.moment[2] * frame.axes[2][i];
+    Vector3 sum = detail::scaled(frame.origin, body.mass);
+    detail::add_scaled(sum, frame.axes[0], body.moment[0]);
+    detail::add_scaled(sum, frame.axes[1], body.moment[1]);
+    detail::add_scaled(sum, frame.axes[2], body.moment[2]);
     return sum;
   }
 
-  // Load on a joint by the weight of a body, by virtual work.
-  double weigh(const detail::Body& body, int joint, const Workspace& workspace) const {
-    const detail::Twist& twist = workspace.twists[static_cast<std::size_t>(joint)];
-    const Vector3 lowering = detail::cross(gravity_, twist.angular);
-    return body.mass * detail::dot(twist.linear, gravity_) +
-           detail::dot(first_moment(body, workspace), lowering);
+  // Loads on joints by the weights of bodies, by virtual work.
+  void evaluate_weights(Workspace& workspace) const {
+    if (weights_.empty()) return;
+    for (std::size_t joint = 0; joint < joints_; ++joint) {
+      const detail::Twist& twist = workspace.twists[joint];
+      workspace.sinkings[joint] = detail::dot(twist.linear, gravity_);
+      workspace.lowerings[joint] = detail::cross(gravity_, twist.angular);
+    }
+    double* load = workspace.loads.data() + coordinates_;
+    for (const detail::Weight& weight : weights_)
+      *load++ = weight.body.mass * workspace.sinkings[weight.joint] +
+                detail::dot(first_moment(weight.body, workspace),
+                            workspace.lowerings[weight.joint]);
   }
 
   void evaluate_loads(const Wrench& wrench, Workspace& workspace) const {
@@ -1062,22 +1176,19 @@ class Model {
         }
       }
       workspace.loads[k] = workspace.twists[k].power(on_joints);
-      if (k >= joints_) workspace.loads[k] += workspace.twists[k].power(on_links);
+      if (weighs_links_ && k >= joints_) workspace.loads[k] += workspace.twists[k].power(on_links);
     }
+    evaluate_weights(workspace);
   }
 
   void add_loaded_terms(const detail::Terms& terms, const std::vector<double>& factors,
                         std::vector<double>& displaced, const Workspace& workspace) const {
-    for (std::size_t number : terms.linear) {
-      const detail::Term& term = terms.all[number];
-      const double load = workspace.loads[static_cast<std::size_t>(term.loads.front())];
-      displaced[static_cast<std::size_t>(term.coordinate)] += factors[number] * load;
-    }
+    for (const detail::LinearTerm& term : terms.linear)
+      displaced[term.coordinate] += factors[term.number] * workspace.loads[term.load];
     for (std::size_t number : terms.others) {
       const detail::Term& term = terms.all[number];
       double amount = factors[number];
-      for (int coordinate : term.loads)
-        amount *= workspace.loads[static_cast<std::size_t>(coordinate)];
+      for (std::size_t load : term.factors) amount *= workspace.loads[load];
       if (term.limit != detail::Limit::none) {
         const double load = workspace.loads[static_cast<std::size_t>(term.limited)];
         if (term.limit == detail::Limit::tanh)
@@ -1085,7 +1196,6 @@ class Model {
         else
           amount *= std::min(std::max(load, -term.threshold), term.threshold);
       }
-      if (term.weighed_joint >= 0) amount *= weigh(term.body, term.weighed_joint, workspace);
       displaced[static_cast<std::size_t>(term.coordinate)] += amount;
     }
   }
@@ -1128,9 +1238,8 @@ class Model {
   }
 
   // Columns of the Jacobian at the pose of the last walk, one for each joint.
-  Jacobian compute_jacobian(const Workspace& workspace) const {
+  void compute_jacobian(const Workspace& workspace, Jacobian& jacobian) const {
     const Vector3 point = workspace.end.place(end_offset_);
-    Jacobian jacobian(joints_);
     for (std::size_t joint = 0; joint < joints_; ++joint) {
       const detail::Twist& twist = workspace.twists[joint];
       const Vector3 lever = detail::cross(twist.angular, point);
@@ -1139,24 +1248,22 @@ class Model {
         jacobian[joint][i + 3] = twist.angular[i];
       }
     }
-    return jacobian;
   }
 
   // Change the angles by a step that removes an error, to first order. All steps are
   // combinations of the directions of the uncorrected command, so that a robot with more
   // than six joints moves as little as possible away from it.
-  bool take_step(const Jacobian& directions, const Jacobian& jacobian,
-                 const std::array<double, 6>& error, Workspace& workspace) const {
+  bool take_step(const std::array<double, 6>& error, Workspace& workspace) const {
     std::array<std::array<double, 6>, 6> square{};
     for (std::size_t joint = 0; joint < joints_; ++joint)
       for (std::size_t i = 0; i < 6; ++i)
         for (std::size_t j = 0; j < 6; ++j)
-          square[i][j] += jacobian[joint][i] * directions[joint][j];
+          square[i][j] += workspace.jacobian[joint][i] * workspace.directions[joint][j];
     std::array<double, 6> multipliers = error;
     if (!detail::solve6(square, multipliers)) return false;
     for (std::size_t joint = 0; joint < joints_; ++joint)
       for (std::size_t i = 0; i < 6; ++i)
-        workspace.angles[joint] += directions[joint][i] * multipliers[i];
+        workspace.angles[joint] += workspace.directions[joint][i] * multipliers[i];
     evaluate_waves(workspace);
     return true;
   }
@@ -1167,15 +1274,19 @@ inline Workspace::Workspace(const Model& model)
       fixed(model.coordinates_),
       coordinates(model.coordinates_),
       displacement(model.coordinates_),
-      loads(model.coordinates_),
-      factors(model.terms_.all.size()),
-      series_factors(model.series_.all.size()),
+      loads(model.coordinates_ + model.weights_.size()),
+      factors(model.terms_.values()),
+      series_factors(model.series_.values()),
       cosines(model.phases_.size()),
       sines(model.phases_.size()),
       multiples(model.joints_ * 2 * (Model::most_multiples + 1)),
       scaled(model.joints_ + 9),
       twists(model.coordinates_),
-      frames(model.transforms_.size() + 1) {}
+      sinkings(model.joints_),
+      lowerings(model.joints_),
+      frames(model.transforms_.size() + 1),
+      directions(model.joints_),
+      jacobian(model.joints_) {}
 
 }  // namespace elastocal
 
