@@ -22,6 +22,18 @@ POSES = (9, 18, 36)
 REPLICATES = 999
 FIGURES = ("mean_m", "rms_m", "reduction", "reduction of none")
 METHODS = ("percentile", "BCa", "ours")
+# Names of the methods and of the kinds of errors in the picture.
+_NAMES = {
+    "percentile": "percentile bootstrap",
+    "BCa": "BCa bootstrap",
+    "ours": "elastocal (bootstrap-t)",
+}
+_TITLES = {
+    "common": "errors common\nto a pose",
+    "uneven": "the same, uneven\nmeasurements",
+    "skewed": "skewed errors\nof poses",
+    "far off": "one pose in 20\nfour times off",
+}
 
 
 def main() -> None:
@@ -60,13 +72,13 @@ def draw(page: Path) -> None:
         for line in page.read_text(encoding="utf-8").splitlines()
         if " / " in line
     ]
-    figure, axes = create_panels(1, len(KINDS), 58, sharey=True)
+    figure, axes = create_panels(1, len(KINDS), 64, sharey=True)
     for axis, kind in zip(axes[0], KINDS, strict=True):
         rows = [line for line in lines if line[0] == kind]
         cells = [row[2 + FIGURES.index("rms_m")] for row in rows]
         values = np.array([cell.split(" / ") for cell in cells], float)
         for column, method in enumerate(METHODS):
-            name = "in use" if method == "ours" else method
+            name = _NAMES[method]
             axis.plot(
                 [int(row[1]) for row in rows],
                 values[:, column],
@@ -76,8 +88,8 @@ def draw(page: Path) -> None:
                 label=name,
             )
         axis.axhline(95, color="black", lw=0.8, ls=":")
-        axis.set(title=kind, xlabel="held-out poses", xticks=POSES)
-    axes[0, 0].set_ylabel("intervals with the true value (%)")
+        axis.set(title=_TITLES[kind], xlabel="held-out poses", xticks=POSES)
+    axes[0, 0].set_ylabel("intervals with\nthe true value (%)")
     figure.legend(
         *axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3
     )

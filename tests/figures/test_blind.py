@@ -61,7 +61,7 @@ def test_targets_have_a_dot_with_its_interval_and_the_range_of_the_target():
 
 
 def make_power_row(effect, level, share, level_of="retained"):
-    shares = ["detected", "holds_truth", "named_right", "oracle_detected"]
+    shares = ["detected", "holds_truth", "named_right", "located", "oracle_detected"]
     row = {"group": "single", "truth": effect, "level": level, "level_of": level_of}
     return row | dict.fromkeys(shares, share)
 
@@ -84,9 +84,10 @@ def test_power_has_a_share_for_each_effect_and_level_and_marks_absorbed_effects(
         "force scale *",
         "all effects",
     ]
-    assert texts_in_axes(figure) == ["50", "90", "70", "70"] * 4
+    assert texts_in_axes(figure) == ["50", "90", "70", "0", "0", "70"] * 5
     cells = figure.axes[0].images[0].get_array().astype(float)
-    # A level at which an effect has no case stays empty.
+    # A level at which an effect has no case is hatched, and has no number.
+    assert len(figure.axes[0].patches) == 2
     np.testing.assert_array_equal(
         np.isnan(np.ma.filled(cells, np.nan)),
         [[False, False], [True, False], [False, False], [False, True]],
@@ -123,9 +124,9 @@ def test_every_error_is_drawn_in_the_row_of_its_model():
             "robot": robot,
             "part": part,
             "model": model,
-            "rms_mm": 1.0 + number,
-            "rms_mm_low": 0.9,
-            "rms_mm_high": 6.0,
+            "reached_mm": 1.0 + number,
+            "reached_mm_low": 0.9,
+            "reached_mm_high": 6.0,
         }
         for robot in ("gp180", "kuka", "all")
         for part in PARTS

@@ -33,6 +33,7 @@ from elastocal.report.words import (
     format_candidate,
     format_hypotheses,
     format_probability,
+    name_data_set,
     spell_out_names,
 )
 from elastocal.verdict import MechanismSet, Probabilities
@@ -110,9 +111,9 @@ TRACKER = "tracker"
 # Colour and label of each kind of contribution to an error budget.
 _CONTRIBUTION_STYLES = {
     "before": ("#b9b9b9", "before calibration"),
-    "effect": (PALETTE[0], "if this alone were left out"),
-    "residual": (PALETTE[2], "left after correction"),
-    TRACKER: ("#ffffff", "in no robot: noise of a single measurement"),
+    "effect": (PALETTE[0], "error if this alone is uncorrected"),
+    "residual": (PALETTE[2], "remaining after correction"),
+    TRACKER: ("#ffffff", "instrument noise (single measurement)"),
 }
 
 
@@ -485,12 +486,11 @@ def draw_errors_by_campaign(table: pd.DataFrame) -> Figure:
 
 
 def _name_campaigns(table: pd.DataFrame) -> pd.Series:
-    """Names of campaigns as people write them, with capitals for robots and series.
+    """Names of campaigns as people write them.
 
     Two sessions of one campaign are distinguished by their numbers of poses.
     """
-    names = table["campaign"].str.replace("_on_", ", judged on ").str.replace("_", " ")
-    names = names.str.replace(r"^\w+|\b\w\b", lambda word: word[0].upper(), regex=True)
+    names = table["campaign"].map(name_data_set)
     poses = table["poses"].map(lambda count: format_count(count, "pose"))
     return names.where(~names.duplicated(keep=False), names + ", " + poses)
 
@@ -609,8 +609,21 @@ def _draw_factors(
             gid="chosen",
             **_CHOSEN_STYLE,
         )
-    # A square-root scale keeps small factors visible; it is symmetric because a
-    # logarithm may be below zero.
+    low = min(factors.min(), 0.0)
+    high = max(factors.max(), 2.0)
+    _set_square_root_scale(axis, low, high)
+    axis.set_xlim(1.08 * low, 1.06 * high)
+    axis.set_xlabel(
+        "natural logarithm of the Bayes factor against the declared model\n"
+        "(square-root scale; above 0 the candidate explains more)"
+    )
+    axis.axvline(0, color="black", linewidth=0.8, zorder=4)
+    axis.set_title("Each candidate cause alone", loc="left")
+
+
+def _set_square_root_scale(axis: Axes, low: float, high: float) -> None:
+    """Scale the x axis by square roots, which keep small values visible beside large
+    ones; negative values are mirrored. The ticks are squares of evenly spaced roots."""
     axis.set_xscale(
         "function",
         functions=(
@@ -618,22 +631,10 @@ def _draw_factors(
             lambda x: np.sign(x) * np.square(x),
         ),
     )
-    low = min(factors.min(), 0.0)
-    high = max(factors.max(), 2.0)
-    # The ticks are squares of evenly spaced roots.
     roots = np.linspace(-np.sqrt(-low), np.sqrt(high), 7)
     ticks = {float(f"{root * abs(root):.2g}") for root in roots} | {0.0}
-    axis.set(
-        xlim=(1.08 * low, 1.06 * high),
-        xticks=sorted(tick for tick in ticks if low <= tick <= high),
-    )
+    axis.set_xticks(sorted(tick for tick in ticks if low <= tick <= high))
     axis.xaxis.set_major_formatter("{x:g}")
-    axis.set_xlabel(
-        "Bayes factor against the declared model\n"
-        "(natural logarithm; above 0 it explains more)"
-    )
-    axis.axvline(0, color="black", linewidth=0.8, zorder=4)
-    axis.set_title("Each candidate cause alone", loc="left")
 
 
 def _compute_row_heights(labels: Sequence[str]) -> np.ndarray:
@@ -711,9 +712,12 @@ def draw_budget_bars(
         zorder=0,
         label=f"tolerance {tolerance_mm:g} mm",
     )
+    largest_mm = max(MILLI * shown[0][1]["rms_m"], tolerance_mm)
+    _set_square_root_scale(axis, 0.0, largest_mm)
+    # Room for the number beside the longest bar.
     axis.set(
-        xlim=(0, 1.1 * max(axis.get_xlim()[1], tolerance_mm)),
-        xlabel="predicted RMS position error (mm)",
+        xlim=(0, 1.4 * largest_mm),
+        xlabel="predicted RMS position error (mm, square-root scale)",
     )
     axis.set_yticks(range(len(shown)), [name for name, _ in shown])
     axis.invert_yaxis()

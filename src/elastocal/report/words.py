@@ -49,6 +49,15 @@ _PARAMETER_WORDS = (
     (r"\bmoment\b", "first moment"),
     (r"\b1 over ([EG])([IJ])\b", r"1/(\1\2)"),
 )
+# Patterns in the names of data sets, and their words.
+_DATA_SET_WORDS = (
+    (r"^(fanuc|ur5|ur10|wam|kuka|fr3)\b", lambda robot: robot[0].upper()),
+    (r"^(motoman|panda)\b", lambda robot: robot[0].capitalize()),
+    (r"\bcpa\b", "circle points"),
+    (r"\bstatic\b", "static poses"),
+    (r"\bjoint\b", "one-joint poses"),
+    (r"\b(grid|random)\b", r"\1 poses"),
+)
 # Common kind of the mechanisms of a family.
 _IN_COMMON = {
     "elastic": "yielding",
@@ -281,6 +290,15 @@ def spell_out_names(text: str) -> str:
 def split_underscores(name: str) -> str:
     """Return a name of the catalogue or of a parameter as words."""
     return name.replace("_", " ")
+
+
+def name_data_set(name: str) -> str:
+    """Return the file name of a campaign as people write it: UR10 A, judged on B."""
+    words = name.replace("_on_", ", judged on ").replace("_", " ")
+    words = re.sub(r"\b[ab]\b", lambda series: series[0].upper(), words)
+    for pattern, replacement in _DATA_SET_WORDS:
+        words = re.sub(pattern, replacement, words)
+    return words
 
 
 def join_items(

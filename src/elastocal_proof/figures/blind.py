@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import StrMethodFormatter
 
 from elastocal.campaigns.reading import read_robot
@@ -49,23 +49,24 @@ _MIN_TARGET_WIDTH = 0.8
 _PANELS = {
     "oracle_detected": "the oracle\ndetects",
     "detected": "detected",
-    "holds_truth": "right name, alone\nor in a class",
-    "named_right": "right name alone",
+    "holds_truth": "mechanism\namong stated",
+    "named_right": "mechanism,\nno alternative",
+    "located": "and at the\ntrue joints",
 }
 # Never black, so that the numbers are legible everywhere.
 _SHARE_COLORS = LinearSegmentedColormap.from_list(
     "shares", ["#ffffff", "#c6dbef", "#4292c6", "#08519c"]
 )
-# Smaller shares are not written into their cells.
-_MIN_WRITTEN_SHARE = 0.045
+# Hatching of cells without a case, in the colour of its lines.
+_NO_CASE = {"facecolor": "white", "edgecolor": "#b0b0b0", "hatch": "////"}
 # Name of all effects, groups or robots together.
 _ALL = "all"
 _MODELS = {
     "uncorrected": "uncorrected",
     "geometry": "geometry alone",
-    "declared": "geometry and springs",
+    "declared": "geometry and compliances",
     "found": "with the effects found",
-    "true": "true model (floor)",
+    "true": "true model (repeatability)",
 }
 _PARTS = {"unloaded": "unloaded", "loaded": "under loads", "milling": "milling path"}
 # Vertical distance between the marks of two robots, in rows.
@@ -213,7 +214,7 @@ def draw_power(rates: pd.DataFrame) -> Figure:
     axes[0, 0].set_yticklabels(
         [_label_effect(name, absorbed) for name in effects], fontsize=7
     )
-    caption = "Numbers are shares of cases in %."
+    caption = "Numbers are shares of cases in %; hatched: no case."
     if absorbed:
         caption += (
             "\n* Wholly absorbed by the joint compliances: the size is that before"
@@ -238,7 +239,10 @@ def _draw_cells(axis: Axes, shares: np.ndarray) -> None:
         interpolation="nearest",
         aspect="auto",
     )
-    for row, column in np.argwhere(np.nan_to_num(shares) >= _MIN_WRITTEN_SHARE):
+    for row, column in np.argwhere(np.isnan(shares)):
+        corner = (column - 0.5, row - 0.5)
+        axis.add_patch(Rectangle(corner, 1.0, 1.0, linewidth=0.0, **_NO_CASE))
+    for row, column in np.argwhere(np.isfinite(shares)):
         share = shares[row, column]
         axis.text(
             column,
@@ -268,7 +272,8 @@ def draw_blind(job: Any) -> None:
 
 @styled
 def draw_correction_errors(table: pd.DataFrame, names: Mapping[str, str]) -> Figure:
-    """Draw the errors of robots after their targets were corrected.
+    """Draw the errors of robots after their targets were corrected, without the noise
+    of the tracker, which would hide the differences.
 
     Each test has a panel, and each correcting model a row.
 
@@ -286,8 +291,8 @@ def draw_correction_errors(table: pd.DataFrame, names: Mapping[str, str]) -> Fig
         for number, robot in enumerate(robots):
             chosen = (table["part"] == test) & (table["robot"] == robot)
             rows = table[chosen].set_index("model").loc[list(_MODELS)]
-            rms = rows["rms_mm"].to_numpy()
-            limits = rows[["rms_mm_low", "rms_mm_high"]].to_numpy().T
+            rms = rows["reached_mm"].to_numpy()
+            limits = rows[["reached_mm_low", "reached_mm_high"]].to_numpy().T
             offset = _MARK_DISTANCE * (0.5 * (len(robots) - 1) - number)
             axis.errorbar(
                 rms,
@@ -302,10 +307,12 @@ def draw_correction_errors(table: pd.DataFrame, names: Mapping[str, str]) -> Fig
         axis.set_xscale("log")
         axis.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         axis.set_title(title)
-        axis.set_xlabel("position error, RMS (mm)")
+        axis.set_xlabel("RMS position error (mm)")
     axes[0, 0].set_yticks(heights, list(_MODELS.values()))
     figure.legend(
         *axes[0, 0].get_legend_handles_labels(),
+        title="without the tracker's noise; bars are 95 % intervals",
+        title_fontsize=7.5,
         loc="outside lower center",
         ncols=max(len(robots), 1),
     )

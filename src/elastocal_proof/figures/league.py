@@ -19,7 +19,7 @@ from elastocal.figures.style import PALETTE, create_panels, draw_note, save, sty
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.io.origin import Origin
-from elastocal.report.words import name_effect
+from elastocal.report.words import name_data_set, name_effect
 from elastocal_proof.league.methods import RANDOM, Method
 from elastocal_proof.league.schemas import ENTRIES, MECHANISMS
 from elastocal_proof.league.table import (
@@ -160,7 +160,7 @@ def draw_mechanisms(table: pd.DataFrame) -> Figure:
             )
     axis.set_xticks(
         range(len(names)),
-        [name.replace("_", " ") for name in names],
+        [name_data_set(name) for name in names],
         rotation=30,
         ha="right",
     )
@@ -172,14 +172,14 @@ def draw_mechanisms(table: pd.DataFrame) -> Figure:
     axis.set_ylim(len(mechanisms) - 0.5, -0.5)
     figure.colorbar(circles, ax=axis, label="probability (mean over folds)", shrink=0.8)
     axis.set_title(
-        "Circle: share of the squared error that geometry leaves, in units of the noise"
+        "Circle: share of the squared residual of the geometric model, in units of the noise"
     )
     return figure
 
 
 def _label_data_set(table: pd.DataFrame, name: str) -> str:
     """Name of a data set with its number of poses, if all of them were predicted."""
-    label = name.replace("_", " ")
+    label = name_data_set(name)
     poses = table.loc[(table["data"] == name) & (table["split"] == "random"), "poses"]
     return f"{label}\n{poses.iloc[0]} poses" if len(poses) else label
 
