@@ -289,7 +289,7 @@ _INVERTED = Hypothesis(
 
 
 def _find_wrong_scale(campaign: Campaign) -> list[Fault]:
-    """Find a board whose squares have another size than its program was told.
+    """Find a board whose squares have another size than its program was set to.
 
     A camera or a board anywhere on the robot takes up most of such an error, so that
     less than an absurd distance may remain; no error of a robot looks like a factor.
@@ -317,7 +317,7 @@ def _find_wrong_scale(campaign: Campaign) -> list[Fault]:
     detail = (
         f"the positions are all too {size}: measurements fit {factor:.4g} times the"
         f" written positions, as if the squares of a board were {factor:.4g} times as"
-        " large as its program was told"
+        " large as its program was set to"
     )
     evidence = float(written[0]), float(best.fun)
     parameters = (Value("factor of all positions", factor, "–"),)
