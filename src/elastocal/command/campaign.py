@@ -47,13 +47,11 @@ _CORES_OF_ONE_CAMPAIGN = 2
 def init(
     folder: Annotated[
         Path,
-        Argument(
-            help="New folder, or one that has measurements or a robot file already."
-        ),
+        Argument(help="New folder, or a folder with measurements or a robot file."),
     ],
     *,
     robot: Annotated[
-        Path | None, Option(help="Robot file to copy there, where there is none.")
+        Path | None, Option(help="Robot file to copy into a folder without one.")
     ] = None,
 ) -> None:
     """Begin a campaign: campaign.yaml with every key explained.
@@ -162,8 +160,8 @@ def diagnose(
         Path | None,
         Option(
             "--with",
-            help="Measurements at corrected targets, as elastocal verify takes them. A"
-            " new campaign beside this one, NAME_round2, has both and is diagnosed.",
+            help="Measurements at corrected targets, as for elastocal verify. They are added"
+            " to a new campaign, NAME_round2, beside this one, which is diagnosed.",
         ),
     ] = None,
     targets: TargetsOption = None,

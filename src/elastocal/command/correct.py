@@ -40,8 +40,8 @@ def correct(
         Path,
         Argument(
             help="CSV of wanted poses: x, y, z in m, rx, ry, rz in rad; fx..fz or"
-            " fx..mz, q1..qn. Options say what else a table has, such as mm, degrees"
-            " and Euler angles."
+            " fx..mz, q1..qn. Options for other tables: units such as mm and degrees,"
+            " Euler angles."
         ),
     ],
     *,
@@ -57,15 +57,15 @@ def correct(
     axes: Annotated[
         str,
         Option(
-            help="What the controller calls q1..qn, such as A1,A2,E1,A3,A4,A5,A6;"
-            " needed where it is ambiguous."
+            help="Controller names of q1..qn, such as A1,A2,E1,A3,A4,A5,A6;"
+            " needed if they are ambiguous."
         ),
     ] = "",
     allow_large_steps: Annotated[
         bool,
         Option(
             "--allow-large-steps",
-            help="Accept joints that turn by more than 5 times what the path turns,"
+            help="Accept joint rotations of more than 5 times the rotation of the path"
             " and 10 degrees.",
         ),
     ] = False,

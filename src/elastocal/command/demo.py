@@ -1,4 +1,4 @@
-"""`elastocal demo`: the whole way, from a plan to a verification, on a simulated
+"""`elastocal demo`: the whole workflow, from a plan to a verification, on a simulated
 robot."""
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def demo(
         ),
     ] = 1,
 ) -> None:
-    """Go the whole way on a simulated KUKA, in about a minute.
+    """Run the whole workflow on a simulated KUKA, in about a minute.
 
     A physical simulation with hidden defects stands in for the robot: it is planned
     for, measured, checked, diagnosed, corrected, certified and verified by the commands

@@ -72,10 +72,10 @@ def export(
 ) -> None:
     """Write the calibrated robot: as a robot file, and as the URDF that it came from.
 
-    A robot file holds geometry, springs and weights, a URDF the geometry alone. Neither
-    holds other effects or the regression on the residual: what is lost with them is
-    said, and the accuracy stated is without the regression. Of files that exist only
-    those are replaced that a command of elastocal has written.
+    A robot file holds geometry, joint compliances and weights, a URDF the geometry
+    alone. Neither holds other effects or the regression on the residual: the command
+    prints the accuracy that is lost without them. Existing files are replaced only if a
+    command of elastocal has written them.
     """
     from rich.console import Console
 

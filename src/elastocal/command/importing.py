@@ -41,7 +41,7 @@ _Output = Annotated[Path, Option("--output", "-o", help="The robot file to write
 _ROBOT_FILE = "robot.yaml"
 # A printed tool is smaller; a larger number is in millimetres.
 _LARGEST_DISTANCE_M = 1.0
-_Force = Annotated[bool, Option("--force", help="Replace the file that is there.")]
+_Force = Annotated[bool, Option("--force", help="Replace an existing file.")]
 
 
 @importing.callback()
@@ -56,7 +56,7 @@ def import_() -> None:
 )
 def urdf(
     file: Annotated[
-        Path, Argument(help="The URDF; of a xacro file, what xacro makes of it.")
+        Path, Argument(help="The URDF, for a xacro file the output of xacro.")
     ],
     *,
     base: Annotated[str, Option(help="Link whose frame is the robot's base frame.")],
@@ -99,15 +99,15 @@ def dh(
     ] = False,
     angles: Annotated[
         Literal["deg", "rad"] | None,
-        Option(help="Unit of columns of angles that state none."),
+        Option(help="Unit of angle columns without a stated unit."),
     ] = None,
     lengths: Annotated[
         Literal["m", "mm"] | None,
-        Option(help="Unit of columns of lengths that state none."),
+        Option(help="Unit of length columns without a stated unit."),
     ] = None,
     decimal: Annotated[
         Literal["point", "comma"] | None,
-        Option(help="Mark of a CSV table. Default: found out."),
+        Option(help="Decimal mark of a CSV table. Default: detected."),
     ] = None,
     ignore: Annotated[
         list[str] | None, Option(help="Column to leave out; as often as needed.")
@@ -147,8 +147,8 @@ def csv(
     files: Annotated[
         list[Path],
         Argument(
-            help="The table: CSV, tabs, semicolons, spaces, .xlsx, .mat; of several each"
-            " is a session, before which the tracker may have been moved."
+            help="The table: CSV, tabs, semicolons, spaces, .xlsx, .mat. Each of several"
+            " tables is a session with its own placement of the tracker."
         ),
     ],
     *,
@@ -162,8 +162,8 @@ def csv(
         str | None,
         Option(
             "--columns",
-            help="Of a table without a header: names in order, q1,q2,…; none to leave"
-            " one out.",
+            help="Names of the columns of a table without a header, q1,q2,…; none leaves"
+            " a column out.",
         ),
     ] = None,
     column: ColumnOption = None,
@@ -172,8 +172,8 @@ def csv(
     target: Annotated[
         list[str] | None,
         Option(
-            help="Name of the target where no column has it; of each of several in a row"
-            " NAME=X,Y,Z, its columns."
+            help="Name of the target if no column has it. For several targets in a row:"
+            " NAME=X,Y,Z, the columns of each."
         ),
     ] = None,
     wrench: Annotated[
@@ -193,7 +193,7 @@ def csv(
     ] = None,
     header: Annotated[
         int | None,
-        Option(min=1, max=MOST_ROWS, help="Line with the names. Default: found out."),
+        Option(min=1, max=MOST_ROWS, help="Line with the names. Default: detected."),
     ] = None,
     joints: Annotated[
         Path | None,
@@ -296,10 +296,10 @@ def sockets(
         float, Option(help="Distance between the centres of neighbouring sockets, m.")
     ] = 0.05,
     robot: Annotated[
-        Path | None, Option(help="Robot file to copy there, where there is none.")
+        Path | None, Option(help="Robot file to copy into a folder without one.")
     ] = None,
     force: Annotated[
-        bool, Option("--force", help="Replace a campaign that is there.")
+        bool, Option("--force", help="Replace an existing campaign.")
     ] = False,
 ) -> None:
     """Make a campaign of a ball in printed sockets (MUKCa): joint angles alone.
@@ -362,10 +362,10 @@ def board(
         str, Option(help="Camera among the sensors of robot_calibration.")
     ] = "camera",
     robot: Annotated[
-        Path | None, Option(help="Robot file to copy there, where there is none.")
+        Path | None, Option(help="Robot file to copy into a folder without one.")
     ] = None,
     force: Annotated[
-        bool, Option("--force", help="Replace a campaign that is there.")
+        bool, Option("--force", help="Replace an existing campaign.")
     ] = False,
 ) -> None:
     """Make a campaign of poses of a board that a camera saw.

@@ -60,7 +60,7 @@ def plan(
         Option(
             min=3,
             max=MOST_POSES,
-            help="Random poses that judge the result and fit nothing.",
+            help="Random poses that only validate the result.",
         ),
     ] = 9,
     number: Annotated[
@@ -82,8 +82,8 @@ def plan(
     measured: Annotated[
         Literal["position", "pose"],
         Option(
-            help="What is read of a target, and by default with which noise: of a laser"
-            " tracker, or of its 6DoF probe."
+            help="Measured quantity of a target, and its default noise: position by a laser"
+            " tracker, or pose by its 6DoF probe."
         ),
     ] = "position",
     base_known: Annotated[
@@ -102,7 +102,7 @@ def plan(
     box: Annotated[
         list[str] | None,
         Option(
-            help="Box to keep out of: xmin,xmax,ymin,ymax,zmin,zmax in m, base axes."
+            help="Box that the robot keeps out of: xmin,xmax,ymin,ymax,zmin,zmax in m, base axes."
         ),
     ] = None,
     floor: Annotated[
@@ -110,21 +110,22 @@ def plan(
         Option(
             min=-_FARTHEST_FLOOR_M,
             max=_FARTHEST_FLOOR_M,
-            help="Height in m, base axes, that forearm and targets stay above: the plane"
-            " that the base stands on.",
+            help="Height in m, base axes, above which forearm and targets stay: the plane"
+            " on which the base stands.",
         ),
     ] = 0.0,
     noise: Annotated[
         str | None,
         Option(
-            help="Standard deviation of a coordinate, such as 0.03mm. Default: usual."
+            help="Standard deviation of a coordinate, such as 0.05mm. Default: 0.03mm, a"
+            " laser tracker at 7.5 m."
         ),
     ] = None,
     orientation_noise: Annotated[
         str | None,
         Option(
             help="Standard deviation of a rotation about an axis, such as 0.01deg."
-            " Default: usual."
+            " Default: 0.005deg, a 6DoF probe."
         ),
     ] = None,
     seed: Annotated[

@@ -55,15 +55,17 @@ ForceOption = Annotated[
     bool,
     Option(
         "--force",
-        help="Replace files that exist, whoever has written them.",
+        help="Replace existing files, including those of other programs.",
     ),
 ]
 # Options of commands that read tables of other programs.
 AnglesOption = Annotated[
-    str | None, Option(help="Unit of angles whose header has none: deg, rad, mrad.")
+    str | None,
+    Option(help="Unit of angles without a unit in the header: deg, rad, mrad."),
 ]
 LengthsOption = Annotated[
-    str | None, Option(help="Unit of lengths whose header has none: m, mm, um, in.")
+    str | None,
+    Option(help="Unit of lengths without a unit in the header: m, mm, um, in."),
 ]
 RotationOption = Annotated[
     str | None,
@@ -85,7 +87,7 @@ UnitOption = Annotated[
 ]
 DecimalOption = Annotated[
     Literal["point", "comma"] | None,
-    Option(help="Mark of decimals. Default: found out."),
+    Option(help="Decimal mark. Default: detected."),
 ]
 TargetsOption = Annotated[
     Path | None,

@@ -48,8 +48,8 @@ def verify(
     tolerance: Annotated[
         str,
         Option(
-            help="Largest allowed RMS position error, such as 0.2mm. Default: that of"
-            " the campaign's last certificate."
+            help="Largest allowed RMS position error, such as 0.2mm. Default: the tolerance"
+            " of the campaign's last certificate."
         ),
     ] = "",
     risk: Annotated[
