@@ -26,7 +26,7 @@ proof: .venv/ready
 audit: .venv/ready-for-audit
 	$(BIN)/snakemake -j$(CORES) audit
 
-# Of the slow tests none: blind proof, planted errors, closed loop, demonstration, tutorial, Slurm, wheel and site are in
+# Of the slow tests none: blind benchmark, planted errors, closed loop, demonstration, tutorial, Slurm, wheel and site are in
 # test-slow. CI adds the twentieth of a commit: make test SLOW="part --part c0ffee"
 SLOW ?= none
 test: .venv/ready-for-tests

@@ -1,8 +1,8 @@
-"""What a data set of the study and a case of the blind proof cost, and what many of
+"""What a data set of the study and a case of the blind benchmark cost, and what many of
 them would: the tables of docs/cluster.md.
 
 Usage: python benchmarks/cost.py SMALL LARGE BLIND --data-sets FEW MORE, with folders of
-finished runs: the study with few data sets, with more, and the quick blind proof.
+finished runs: the study with few data sets, with more, and the quick blind benchmark.
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ def small_study(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def small_proof(tmp_path_factory):
-    """The smallest blind proof, finished; not by the seed of the proof: what is looked
+    """The smallest blind benchmark, finished; not by the seed of the proof: what is looked
     at here is not part of it."""
     return made_once(
         tmp_path_factory, "proof", {"seed": 31}, "blind", "--config", "blind=smoke"

@@ -170,13 +170,14 @@ rule write_blind_page:
 
 
 rule blind_pictures:
-    """Pictures and the table of docs/, from a finished benchmark."""
+    """Pictures, tables and scores by case of docs/, from a finished benchmark."""
     input:
         sources=[
             rules.write_blind_page.output.page,
             rules.draw_blind.output.targets,
             rules.draw_blind.output.reliability,
             rules.draw_blind.output.power,
+            rules.score_cases.output.cases,
         ],
     output:
         copies=[
@@ -184,6 +185,7 @@ rule blind_pictures:
             "docs/blind_targets.png",
             "docs/blind_reliability.png",
             "docs/blind_power.png",
+            "docs/blind_cases.parquet",
         ],
     script:
         "../scripts/copy_into_docs.py"

@@ -1,4 +1,4 @@
-"""From a campaign's folder to its verdict in one call, for the blind proof, benchmarks
+"""From a campaign's folder to its verdict in one call, for the blind benchmark, benchmarks
 and notebooks. The pipeline makes the same two calls with tables between them."""
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ _CORRECTABLE = ("adequate", "named", "class", "several")
 _REPORTS = {
     "reports/paper.pdf": "the paper, regenerated",
     "reports/study.pdf": "the study",
-    "reports/blind/targets.md": "the blind proof",
+    "reports/blind/targets.md": "the blind benchmark",
 }
 
 

@@ -1,5 +1,5 @@
 """Audit of campaigns: simulated ones drawn again, the split of the poses, and seals of
-the blind proof."""
+the blind benchmark."""
 
 from __future__ import annotations
 
@@ -157,7 +157,7 @@ def check_split(run: FinishedRun, file: str, campaign: str) -> Iterator[Finding]
 
 
 def check_seals(run: FinishedRun, file: str) -> Iterator[Finding]:
-    """Every ground truth of the blind proof is what was sealed, and every sealed one is
+    """Every ground truth of the blind benchmark is what was sealed, and every sealed one is
     there."""
     digests = {
         path.name: hashlib.sha256(path.read_bytes()).hexdigest()
