@@ -14,6 +14,8 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import combinations
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -28,6 +30,7 @@ from elastocal.fitting.model import list_parameters
 from elastocal.fitting.noise import estimate_noise
 from elastocal.io.documents import read_document
 from elastocal.loop.whole import read_cases
+from elastocal.residual_model.regressions import REGRESSIONS, Inputs
 from elastocal_proof.blind.cases import list_cases, write_sealed_case
 from elastocal_proof.blind.folders import build_campaign_document, write_robot_file
 from elastocal_proof.plant.arm import read_arm
@@ -50,6 +53,10 @@ LARGE = Design(
     declared=("joint_offset", "link_geometry"),
 )
 FIT_TARGET = 8.0
+# Columns of the Jacobian for the regressions: base, links and effects of a model.
+JACOBIAN_COLUMNS = 60
+FOLDS = 5
+FOLDS_TARGET = 0.8
 GROWTH_TARGET = 1.2
 CASE_S = 0.85
 SERIES_A_S = 45.0
@@ -82,7 +89,8 @@ class Setting:
     Attributes
     ----------
     fitted : measurements of the fit
-    repetitions : repetitions of the fit
+    regressed : measurements of the regressions
+    repetitions : repetitions of the fit and of the regressions
     cases : cases of the blind benchmark
     series_a : rows of UR10 Series A; None for all
     growth : measurements of the two campaigns that are compared
@@ -90,6 +98,7 @@ class Setting:
     """
 
     fitted: int
+    regressed: int
     repetitions: int
     cases: int
     series_a: int | None
@@ -99,13 +108,14 @@ class Setting:
 
 # The median of a dozen cases lies between two groups of cases and changes by a tenth from
 # run to run, so there are more. The small setting measures one campaign for all rows.
-FULL = Setting(6000, 3, 48, None, (20_000, 80_000), 1_000_000)
-SMALL = Setting(1000, 1, 1, 60, (1000, 30_000), 1000)
+FULL = Setting(6000, 2000, 3, 48, None, (20_000, 80_000), 1_000_000)
+SMALL = Setting(1000, 100, 1, 1, 60, (1000, 30_000), 1000)
 
 
 def rows(work: Path, setting: Setting) -> Iterator[Row]:
     """Measure all rows of the report in a temporary folder."""
     yield _fit(work, setting.fitted, setting.repetitions)
+    yield _folds(setting.regressed, setting.repetitions)
     yield _case(work, setting.cases)
     small_run, large_run = (
         _run([_large(work, measurements)]) for measurements in setting.growth
@@ -190,6 +200,51 @@ def _fit(work: Path, measurements: int, repetitions: int) -> Row:
         ours / theirs <= FIT_TARGET,
         how,
     )
+
+
+def _folds(measurements: int, repetitions: int) -> Row:
+    """Compare the ridge regressions on all unions of three of five folds, which share
+    the Gram matrices of the folds, with the same ones each by itself."""
+    draws = np.random.default_rng(1)
+    inputs = Inputs(
+        draws.uniform(-2.0, 2.0, (measurements, 6)),
+        np.zeros((measurements, 3)),
+        draws.standard_normal((measurements, 3, JACOBIAN_COLUMNS)),
+    )
+    residual = 1e-4 * draws.standard_normal((measurements, 3))
+    functions = {
+        "with shared Gram matrices": partial(_regress, inputs, residual, shared=True),
+        "each by itself": partial(_regress, inputs, residual, shared=False),
+    }
+    ours, theirs = map(min, interleaved(functions, repetitions))
+    how = (
+        f"ridge regressions on unions of {FOLDS} folds of {measurements} measurements"
+        f" against the same without common matrices, minimum of {repetitions}"
+    )
+    return Row(
+        "engine folds",
+        ours,
+        theirs,
+        ours / theirs,
+        f"<= {FOLDS_TARGET:g}",
+        ours / theirs <= FOLDS_TARGET,
+        how,
+    )
+
+
+def _regress(inputs: Inputs, residual: np.ndarray, *, shared: bool) -> None:
+    """Fit the ridge regressions on all unions of three folds."""
+    folds = [slice(number, None, FOLDS) for number in range(FOLDS)]
+    parts = [inputs.select(fold) for fold in folds]
+    for union in combinations(range(FOLDS), FOLDS - 2):
+        joined = Inputs.join([parts[number] for number in union])
+        if not shared:
+            joined = replace(joined, parts=())
+        rows = np.concatenate([residual[folds[number]] for number in union])
+        for name in ("ridge_harmonics", "two_joints"):
+            regression = REGRESSIONS[name]
+            for _ in regression.fit(joined, rows, regression.settings, 1):
+                pass
 
 
 def _case(work: Path, cases: int) -> Row:
