@@ -98,6 +98,7 @@ def test_products_are_those_of_the_dense_sensitivities_for_any_block_size(
     np.testing.assert_allclose(
         factored.at(factored.state > 0).dense(), dense[factored.state > 0], atol=1e-12
     )
+    np.testing.assert_allclose(factored.combine(sizes), dense @ sizes, atol=1e-12)
     vectors = np.random.default_rng(1).standard_normal((*dense.shape[:2], 2))
     # The states of a pose follow each other, and poses differ in their size.
     pose = factored.state // 2

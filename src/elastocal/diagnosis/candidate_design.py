@@ -130,9 +130,8 @@ class WhitenedFit:
             return whitener.apply(values * root_weights.reshape(-1, *trailing_axes))
 
         columns = linearization.columns
-        contribution = (
-            columns.select_columns(self.is_candidate).dense()
-            @ self.linear_values[self.is_candidate]
+        contribution = columns.combine(
+            np.where(self.is_candidate, self.linear_values, 0.0)
         )
         no_candidates = FactoredSensitivities.of(
             [],

@@ -213,6 +213,16 @@ class FactoredSensitivities:
                 entries[span] += self.values[span, states] @ products[:, number]
         return self._fold @ entries
 
+    def combine(self, coefficients: np.ndarray) -> np.ndarray:
+        """Sum of the columns times their coefficients (K,), (M, rows) array, without
+        the columns themselves."""
+        weights = coefficients[self.column]
+        combined = np.zeros(self.jacobian.shape[:2])
+        for coordinate, span in self.spans:
+            displacement = weights[span] @ self.values[span]
+            combined += self.jacobian[..., coordinate] * displacement[self.state, None]
+        return combined
+
     def multiply_by_pose(self, right: np.ndarray, pose: np.ndarray) -> np.ndarray:
         """Products of the columns with rows (M, rows, n), summed over each pose.
 
