@@ -2,10 +2,11 @@
 
 `python benchmarks/simple_fits.py FOLDER...` cross-validates each campaign by five folds
 of whole poses, and prints held-out RMS errors of the declared model as the diagnosis
-first fits it; of the same fit under the noise that it leaves; of least squares on a
-minimal set of parameters, by QR with column pivoting; and of ridge regression whose
-penalty inner folds choose. Ratios to the better of the two simple fits have 95 %
-intervals, from a bootstrap over poses.
+first fits it; of the same fit under the noise of measurements and poses that it leaves,
+which is kept if no effect is adopted; of least squares on a minimal set of parameters,
+by QR with column pivoting; and of ridge regression whose penalty inner folds choose.
+Ratios to the better of the two simple fits have 95 % intervals, from a bootstrap over
+poses. `--seed` draws other folds.
 """
 
 import argparse
@@ -15,6 +16,11 @@ import numpy as np
 from common import ROOT
 from scipy.linalg import qr
 
+from elastocal.diagnosis.candidate_design import build_candidate_design
+from elastocal.diagnosis.refit import estimate_residual_noise
+from elastocal.diagnosis.search import screen_terms
+from elastocal.diagnosis.settings import Settings
+from elastocal.effects.protocol import Candidate
 from elastocal.fitting.least_squares import Fit, fit_model
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import (
@@ -23,14 +29,7 @@ from elastocal.fitting.model import (
     find_placement_parameters,
     get_parameter_values,
 )
-from elastocal.fitting.noise import (
-    PRIOR_SCALES,
-    Noise,
-    estimate_noise,
-    fit_declared_model,
-    maximize_evidence,
-    set_prior_scale,
-)
+from elastocal.fitting.noise import Noise, estimate_noise, fit_declared_model
 from elastocal.fitting.observations import Observations, index_poses, select_states
 from elastocal.loop.whole import read_cases
 from elastocal.validation.held_out import compute_position_residuals
@@ -44,14 +43,15 @@ OURS = ("declared fit", "under the noise that it leaves")
 SIMPLE = ("minimal least squares", "ridge")
 
 
-def fit_under_remaining_noise(
-    case: Case, observations: Observations, noise: Noise
-) -> Fit:
-    """Fit with the prior scale and the noise that are most probable together."""
-    wide = set_prior_scale(case.model, PRIOR_SCALES[-1])
-    evidence = maximize_evidence(fit_model(wide, observations, noise))
-    model = set_prior_scale(case.model, evidence.prior_scale)
-    return fit_model(model, observations, noise.scaled(evidence.noise_factor))
+def find_noise_left(
+    declared: Fit, observations: Observations, candidates: list[Candidate]
+) -> Noise:
+    """Noise of measurements and poses that a declared model leaves."""
+    design = build_candidate_design(declared, observations, candidates, Settings())
+    empty_model, _ = screen_terms(design.problem)
+    return estimate_residual_noise(
+        design.problem, empty_model, declared.noise, declared.noise
+    )
 
 
 def linearize_positions(
@@ -110,7 +110,8 @@ def predict_fold(
 ) -> dict[str, np.ndarray]:
     """Residuals (M, 3) of the observations of a fold by each fit, m."""
     declared = fit_declared_model(case.model, training, noise)
-    matched = fit_under_remaining_noise(case, training, noise)
+    left = find_noise_left(declared, training, [*case.candidates.values()])
+    matched = fit_model(declared.model, training, left, declared.estimate)
     residuals = {
         name: compute_position_residuals(fitted.model, fitted.estimate, test)
         for name, fitted in zip(OURS, (declared, matched), strict=True)
@@ -131,13 +132,13 @@ def predict_fold(
     return residuals
 
 
-def cross_validate(case: Case) -> dict[str, np.ndarray]:
+def cross_validate(case: Case, seed: int) -> dict[str, np.ndarray]:
     """Mean squared errors (poses,) of each fit at poses that it was not fitted to."""
     observations = case.observations
     noise = estimate_noise(case)[0]
     pose = index_poses(observations.states)
     count = int(pose.max()) + 1
-    fold = np.random.default_rng(5).permutation(count)[pose] % FOLDS
+    fold = np.random.default_rng(seed).permutation(count)[pose] % FOLDS
     squares: dict[str, np.ndarray] = {
         name: np.zeros(count) for name in (*OURS, *SIMPLE)
     }
@@ -172,6 +173,9 @@ def print_comparison(name: str, squares: dict[str, np.ndarray]) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folders", nargs="+", type=Path)
-    for folder in parser.parse_args().folders:
+    parser.add_argument("--seed", type=int, default=5)
+    arguments = parser.parse_args()
+    for folder in arguments.folders:
         training_case, _ = read_cases(folder, ROOT / "config" / "robots")
-        print_comparison(folder.name, cross_validate(training_case))
+        squares = cross_validate(training_case, arguments.seed)
+        print_comparison(folder.name, squares)
