@@ -116,9 +116,8 @@ def _count_effective_cases(outcomes: np.ndarray, clusters: Sequence[Any]) -> flo
     if variance == 0.0:
         return float(cases)
     # The variance is estimated from few clusters, which widens the interval.
-    of_cases, of_clusters = map(
-        float, t_distribution.ppf(0.975, [cases - 1, count - 1])
-    )
+    of_cases = float(t_distribution.ppf(0.975, cases - 1))
+    of_clusters = float(t_distribution.ppf(0.975, count - 1))
     correction = (of_cases / of_clusters) ** 2
     return float(min(cases, correction * rate * (1.0 - rate) / variance))
 

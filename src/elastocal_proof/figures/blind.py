@@ -58,7 +58,11 @@ _SHARE_COLORS = LinearSegmentedColormap.from_list(
     "shares", ["#ffffff", "#c6dbef", "#4292c6", "#08519c"]
 )
 # Hatching of cells without a case, in the colour of its lines.
-_NO_CASE = {"facecolor": "white", "edgecolor": "#b0b0b0", "hatch": "////"}
+_NO_CASE: dict[str, Any] = {
+    "facecolor": "white",
+    "edgecolor": "#b0b0b0",
+    "hatch": "////",
+}
 # Name of all effects, groups or robots together.
 _ALL = "all"
 _MODELS = {
