@@ -27,6 +27,7 @@ from elastocal.data_checks.placement import (
     select_spread_poses,
 )
 from elastocal.data_checks.protocol import Fault, Value
+from elastocal.data_checks.swapped_places import find_swapped_places
 from elastocal.fitting.least_squares import compute_negative_compliances
 from elastocal.fitting.model import get_joint_compliances
 from elastocal.fitting.observations import index_poses
@@ -138,11 +139,11 @@ LOAD_UNITS = (
 def find_faults(campaign: Campaign) -> tuple[Fault, ...]:
     """Find the faults that the measurements of a campaign show.
 
-    A check is skipped if a fault that was already found makes it meaningless. All of
-    them compare positions, which campaigns with features do not have.
+    A check is skipped if a fault that was already found makes it meaningless. All but
+    the first compare positions, which campaigns with features do not have.
     """
     if campaign.measuring.channels:
-        return ()
+        return tuple(find_swapped_places(campaign))
     for find in (find_constant_columns, find_better_interpretation):
         faults = find(campaign)
         if faults:
