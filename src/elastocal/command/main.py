@@ -75,7 +75,7 @@ def with_version(
 ) -> None:
     """From a robot and a laser tracker to a corrected robot.
 
-    The order of the work: plan, measure, check, diagnose, correct, certificate,
+    The steps in order: plan, measure, check, diagnose, correct, certificate,
     verify.
     """
     if version:
