@@ -100,7 +100,7 @@ def link_geometry(entry: Effect, sites: Sites, joint: int) -> Candidates:
 
 # This effect moves the robot, because its tasks refer to the declared base frame.
 @_effect(
-    "base that stands elsewhere than declared",
+    "base displaced from its declared placement",
     Size(
         "shift",
         5e-4,
@@ -140,7 +140,7 @@ def declared_base(sites: Sites) -> Candidate:
 
 # The reflector circles in its nest; the flange does not.
 @_effect(
-    "eccentric nest of the reflector",
+    "eccentric reflector nest",
     Size("shift", 5e-5, "a worn reflector nest"),
     moves_robot=False,
     formula=r"d = \sum_e e\, (a_e \cos 2 q + b_e \sin 2 q)",
@@ -240,7 +240,7 @@ def scale_displacements(
 # Tracker and base drift alike in the measurements. Tasks refer to the base as it stands,
 # so that they do not feel the drift.
 @_drift(
-    "drift of the tracker or of the robot's foot",
+    "drift of the tracker or the robot base",
     Size("shift an hour", 2e-4, "a tripod on a warming floor"),
     Size("turn an hour", 1e-4, "the same over the height of the stand"),
     moves_robot=False,
