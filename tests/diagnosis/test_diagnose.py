@@ -101,7 +101,7 @@ def test_an_error_that_all_measurements_of_a_pose_share_is_noise_and_is_reported
     case, _ = read_cases(folder, config_folder / "robots")
     diagnosis = diagnose(case, Settings(), 1)
     assert diagnosis.document["verdict"] == "adequate"
-    warnings = [w for w in diagnosis.document["warnings"] if "err together" in w]
+    warnings = [w for w in diagnosis.document["warnings"] if "are correlated" in w]
     assert len(warnings) == (error_rad > 0)
     # Neighbours in the grid of the pose error differ by a factor of two.
     pose_rad = diagnosis.final.noise.pose_rad

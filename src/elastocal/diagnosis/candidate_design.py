@@ -348,7 +348,7 @@ class CandidateDesign:
         """Why a candidate is not tested, by key."""
         tested = {term.candidate.key for term in self.problem.terms if term.candidate}
         too_small = sorted(set(self.tried) - tested)
-        reason = "too small to be seen at any size that such an effect has"
+        reason = "not detectable even at its largest plausible size"
         return self.untestable_by_data | dict.fromkeys(too_small, reason)
 
 

@@ -300,9 +300,9 @@ def describe_reference_point(campaign: Campaign) -> str:
         names = ", ".join(
             f"{target.name} on {target.point}" for target in campaign.targets
         )
-        between = "what lies between is the robot file's."
+        between = "the distance between them is that of the robot file."
         return (
-            f"All errors are those of {end}, on which no target was measured ({names}): "
+            f"Errors refer to point {end}, on which no target was measured ({names}): "
             f"{between}"
         )
     descriptions = []
@@ -314,8 +314,8 @@ def describe_reference_point(campaign: Campaign) -> str:
             uncertainty = ""
             if target.has_inexact_offset:
                 uncertainty = f", known to {1e3 * target.offset_std_m:.2g} mm"
-            descriptions.append(f"{target.name} at {offset} of it{uncertainty}")
-    return f"All errors are those of {end}, measured by the target {'; '.join(descriptions)}."
+            descriptions.append(f"{target.name}, offset {offset}{uncertainty}")
+    return f"Errors refer to point {end} (target {'; '.join(descriptions)})."
 
 
 def _end_targets(campaign: Campaign) -> list[Target]:

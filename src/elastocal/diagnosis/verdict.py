@@ -628,7 +628,7 @@ def warn_of_pose_error(residual_noise: Noise, least_rad: float) -> list[str]:
     if residual_noise.pose_rad < least_rad:
         return []
     return [
-        "measurements of a pose err together as if every joint were "
-        f"{1e6 * residual_noise.pose_rad:.0f} µrad off, "
-        "which repeats of a pose do not show: new poses will err as much"
+        "errors within a pose are correlated, as if each joint were "
+        f"{1e6 * residual_noise.pose_rad:.0f} µrad off, which repeats of a pose do not "
+        "show: new poses will have errors of this size"
     ]
