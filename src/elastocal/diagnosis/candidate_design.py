@@ -31,6 +31,7 @@ from elastocal.fitting.linearization import FactoredSensitivities, linearize
 from elastocal.fitting.model import find_nonlinear_parameters, get_parameter_values
 from elastocal.fitting.normal_equations import compute_whitening
 from elastocal.fitting.observations import Observations, select_spread_poses
+from elastocal.fitting.sensor_noise import compute_sensor_roots
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -121,8 +122,10 @@ class WhitenedFit:
             fitted.model, fitted.estimate, observations, self.conditions
         )
         root_weights = np.sqrt(fitted.weights)
+        noise = fitted.noise.without_pose_error
+        roots = compute_sensor_roots(fitted.model, fitted.estimate, observations, noise)
         whitener = compute_whitening(
-            observations, linearization.joint_jacobian, fitted.noise.without_pose_error
+            observations, linearization.joint_jacobian, noise, roots
         )
 
         def whiten(values: np.ndarray) -> np.ndarray:

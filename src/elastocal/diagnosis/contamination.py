@@ -27,6 +27,10 @@ from elastocal.fitting.observations import (
     select_states,
     separate_measurements,
 )
+from elastocal.fitting.sensor_noise import (
+    compute_sensor_roots,
+    standardize_residual,
+)
 
 if TYPE_CHECKING:
     from elastocal.diagnosis.candidate_design import CandidateDesign
@@ -251,7 +255,8 @@ class _Linearization:
         design = build_candidate_design(
             reference, observations, list(case.candidates.values()), settings
         )
-        return cls(design, reference.residual / noise.sensor_std(observations.rows))
+        roots = compute_sensor_roots(fitted.model, fitted.estimate, observations, noise)
+        return cls(design, standardize_residual(reference.residual, noise, roots))
 
     @property
     def distance(self) -> np.ndarray:

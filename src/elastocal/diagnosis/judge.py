@@ -22,7 +22,7 @@ from elastocal.diagnosis.gross_errors import (
 from elastocal.diagnosis.studentized_residuals import estimate_prediction_uncertainty
 from elastocal.fitting.model import (
     Case,
-    compute_residuals,
+    compute_residual_vectors,
     evaluate_conditions,
     predict,
     transform_to_base,
@@ -503,7 +503,9 @@ def _tabulate_stages(
     residuals = {}
     for stage, (model, estimate) in stages.items():
         conditions = evaluate_conditions(model, estimate, observations.states)
-        residuals[stage] = compute_residuals(model, estimate, observations, conditions)
+        residuals[stage] = compute_residual_vectors(
+            model, estimate, observations, conditions
+        )
     model, estimate = stages["after"]
     if model.measuring is None:
         position, _ = transform_to_base(estimate, observations)

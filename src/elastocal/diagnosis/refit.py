@@ -23,6 +23,7 @@ from elastocal.fitting.least_squares import CONVERGENCE_TOLERANCE, fit_model
 from elastocal.fitting.model import get_parameter_values
 from elastocal.fitting.noise import set_prior_std
 from elastocal.fitting.normal_equations import compute_whitening
+from elastocal.fitting.sensor_noise import compute_sensor_roots
 
 if TYPE_CHECKING:
     from elastocal.diagnosis.candidate_design import CandidateDesign
@@ -163,7 +164,9 @@ def limit_pose_error(fitted: Fit, observations: Observations, pose_rad: float) -
     mean_square = (fitted.whiten(fitted.residual) ** 2).mean()
     residual = fitted.residual * np.sqrt(fitted.weights)[:, None]
     for _ in range(_MAX_NOISE_STEPS):
-        white = compute_whitening(observations, jacobian, noise).apply(residual)
+        roots = compute_sensor_roots(fitted.model, fitted.estimate, observations, noise)
+        whitening = compute_whitening(observations, jacobian, noise, roots)
+        white = whitening.apply(residual)
         excess = (white**2).mean() / mean_square
         noise = noise.scaled(float(np.sqrt(excess)))
         if excess < 1.0 + _NOISE_TOLERANCE:

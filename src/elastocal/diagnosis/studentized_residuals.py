@@ -31,6 +31,10 @@ from elastocal.fitting.observations import (
     separate_measurements,
     split_into_blocks,
 )
+from elastocal.fitting.sensor_noise import (
+    compute_sensor_roots,
+    standardize_residual,
+)
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Measurements
@@ -311,7 +315,10 @@ def examine_residuals(
     for states, rows, block in split_into_blocks(observations, 0):
         around = _conditions_at(model, estimate, block, shared, states)
         residual[rows] = compute_residuals(model, estimate, block, around)
-    sensor_distance = np.linalg.norm(residual / noise.sensor_std(model.rows), axis=1)
+    roots = compute_sensor_roots(model, estimate, observations, noise)
+    sensor_distance = np.linalg.norm(
+        standardize_residual(residual, noise, roots), axis=1
+    )
     limit = np.quantile(sensor_distance[spread], _EXAMINED_QUANTILE)
     examined = spread | in_sample | (sensor_distance > limit)
     blocks = []
@@ -322,13 +329,19 @@ def examine_residuals(
     ):
         around = _conditions_at(model, estimate, block, shared, states)
         linear_model = linearized(model, estimate, block, around)
-        jacobian = linear_model.joint_jacobian
+        jacobian = linear_model.joint_jacobian[:, None]
+        roots = compute_sensor_roots(model, estimate, block, noise)
         blocks.append(
             _RowBlock(
                 rows,
                 linear_model.sensitivities if include_parameters else None,
-                compute_measurement_covariances(noise, jacobian[:, None], model.rows),
-                jacobian @ jacobian.transpose(0, 2, 1),
+                compute_measurement_covariances(
+                    noise,
+                    jacobian,
+                    model.rows,
+                    None if roots is None else roots[:, None],
+                ),
+                jacobian[:, 0] @ jacobian[:, 0].transpose(0, 2, 1),
             )
         )
     return StudentizedResiduals(

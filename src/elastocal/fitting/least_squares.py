@@ -34,6 +34,7 @@ from elastocal.fitting.normal_equations import (
     solve_normal_equations,
 )
 from elastocal.fitting.observations import sample_observations, split_into_blocks
+from elastocal.fitting.sensor_noise import compute_sensor_roots
 from elastocal.measuring.catalogue import list_kinds
 from elastocal.mechanics.kinematics import compute_point_poses
 
@@ -201,7 +202,12 @@ class Fit:
                 jacobian = linear_model.joint_jacobian
             else:
                 jacobian = self.joint_jacobian[indices]
-            whitening = compute_whitening(block.observations, jacobian, self.noise)
+            roots = compute_sensor_roots(
+                self.model, self.estimate, block.observations, self.noise
+            )
+            whitening = compute_whitening(
+                block.observations, jacobian, self.noise, roots
+            )
             plain = linear_model.sensitivities
             root = np.sqrt(self.weights[indices])[:, None, None]
             yield indices, plain, whitening.apply(plain * root)

@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Target
     from elastocal.effects.conditions import Conditions
     from elastocal.fitting.observations import States
+    from elastocal.fitting.sensor_noise import ShapedNoise
     from elastocal.measuring.channels import MeasuringPlan
     from elastocal.mechanics.chain import MeasuringPoint
 
@@ -106,6 +107,8 @@ class Model:
     measuring : MeasuringPlan or None
         Kinds, features and channels of the campaign; None if every measurement is the
         position or pose of a target.
+    shaped_noise : ShapedNoise or None
+        Noise of a kind that differs between measurements and directions.
     """
 
     sites: Sites
@@ -119,6 +122,7 @@ class Model:
     compliance_known: bool = True
     base_std_m: float = 0.0
     measuring: MeasuringPlan | None = None
+    shaped_noise: ShapedNoise | None = None
 
     @property
     def has_orientations(self) -> bool:
@@ -618,6 +622,26 @@ def compute_residuals(
     return subtract_prediction(model, estimate, observations, position, rotation)
 
 
+def compute_residual_vectors(
+    model: Model, estimate: Estimate, observations: Observations, conditions: Conditions
+) -> np.ndarray:
+    """Compute residuals as vectors, (M, 3) or (M, 6) array, base axes.
+
+    A single number is a vector along the direction in which it was measured, such as the
+    normal of a plane. Arguments are those of `predict`.
+    """
+    if model.measuring is None or model.rows > 1:
+        return compute_residuals(model, estimate, observations, conditions)
+    poses = predict(model, estimate, observations, conditions)
+    prediction = evaluate_channels(
+        model.measuring,
+        observations,
+        place_in_session(estimate, observations, *poses),
+        estimate.features,
+    )
+    return prediction.residual * prediction.by_pose[:, 0, :3]
+
+
 def subtract_prediction(
     model: Model,
     estimate: Estimate,
@@ -727,9 +751,18 @@ def prepare_case(campaign: Campaign, source: str) -> Case:
         for key, candidate in candidates_on(sites).items()
         if candidate.effect not in campaign.declared
     }
-    return Case(
+    case = Case(
         campaign,
         average_repeats(remove_outlying_repeats(campaign.measurements)),
         model,
         candidates,
+    )
+    # Import the estimate only here, because fits import this module.
+    from elastocal.fitting.noise import estimate_shaped_noise
+
+    shaped = estimate_shaped_noise(case)
+    return (
+        case
+        if shaped is None
+        else replace(case, model=replace(model, shaped_noise=shaped))
     )

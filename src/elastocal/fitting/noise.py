@@ -37,6 +37,7 @@ from elastocal.fitting.observations import (
     select_states,
     separate_approaches,
 )
+from elastocal.fitting.sensor_noise import ShapedNoise, estimate_factors
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -82,6 +83,8 @@ PRIOR_SCALES = np.geomspace(0.1, 10.0, 9)
 _NOISE_FACTORS = np.geomspace(1.0, 1e4, 185)
 # A smaller remaining share of a prior's variance is rounding.
 _SHARE_ROUNDING = 1e-14
+# Rounds of the estimate of a shaped noise: the third changes it by a few per cent.
+_SHAPE_ROUNDS = 3
 # Noise that is assumed before anything is known about it, m and rad.
 _ASSUMED_NOISE = 1e-4
 
@@ -576,6 +579,42 @@ def fit_declared_model(model: Model, observations: Observations, noise: Noise) -
         wide.estimate,
         reweight_first_step=True,
     )
+
+
+def estimate_shaped_noise(case: Case) -> ShapedNoise | None:
+    """Estimate the noise of a kind that states its shape, such as that of a camera.
+
+    Fits of the declared model and estimates of the factors alternate. What the model
+    lacks counts as noise here; a diagnosis estimates the level of the noise again.
+
+    Returns None if the kind states no shape.
+    """
+    plan = case.campaign.measuring
+    kind = plan.kinds[0]
+    observations = case.observations
+    if plan.channels or observations.rotation is None or not len(observations):
+        return None
+    options = {"camera": plan.camera}
+    if not kind.shape_noise(observations.position, observations.rotation, options):
+        return None
+    declared = _read_declared_noise(case.campaign)
+    joints = np.zeros(case.campaign.robot.joints)
+    assumed = Noise("residual", _ASSUMED_NOISE, _ASSUMED_NOISE, joints)
+    noise = declared or assumed
+    model = case.model
+    shaped = ShapedNoise(kind, plan.camera, np.ones(1))
+    for _ in range(_SHAPE_ROUNDS):
+        fitted = fit_declared_model(model, observations, noise)
+        session = np.searchsorted(
+            fitted.estimate.sessions, observations.states.session[observations.state]
+        )
+        frame = fitted.estimate.frame_rotation[session, None]
+        vectors = fitted.residual.reshape(len(observations), 2, 3, 1)
+        residual = (frame @ vectors).reshape(len(observations), 6)
+        shaped = estimate_factors(shaped, observations, residual)
+        model = replace(model, shaped_noise=shaped)
+        noise = declared or replace(assumed, position_m=shaped.reference_m)
+    return shaped
 
 
 def find_declared_geometry(model: Model) -> set[str]:

@@ -22,6 +22,7 @@ from elastocal.fitting.model import (
     update_springs_and_masses,
 )
 from elastocal.fitting.observations import batch_groups_by_size, split_into_blocks
+from elastocal.fitting.sensor_noise import compute_sensor_roots
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -252,7 +253,7 @@ def compute_measurement_covariances(
     noise: Noise,
     jacobians: np.ndarray,
     rows: int,
-    spread: np.ndarray | None = None,
+    roots: np.ndarray | None = None,
 ) -> np.ndarray:
     """Compute the covariance of all measurements of one approach.
 
@@ -263,8 +264,8 @@ def compute_measurement_covariances(
         Jacobians of k targets with respect to the joints.
     rows : int
         3 for positions, 6 for poses, 1 for single numbers.
-    spread : (G, k) array, optional
-        Standard deviation of each measurement over that of the noise.
+    roots : (G, k, rows, rows) array, optional
+        See `compute_sensor_roots`.
 
     Returns
     -------
@@ -275,15 +276,22 @@ def compute_measurement_covariances(
     stacked = jacobians.reshape(groups, size, -1) * noise.joint_rad
     covariance = stacked @ stacked.transpose(0, 2, 1)
     diagonal = np.arange(size)
-    sensor_variance = np.tile(noise.sensor_std(rows) ** 2, targets)
-    if spread is not None:
-        sensor_variance = sensor_variance * np.repeat(spread**2, rows, axis=1)
-    covariance[:, diagonal, diagonal] += sensor_variance
+    if roots is None:
+        variance = np.tile(noise.sensor_std(rows) ** 2, targets)
+        covariance[:, diagonal, diagonal] += variance
+        return covariance
+    for number in range(targets):
+        block = slice(number * rows, (number + 1) * rows)
+        root = roots[:, number]
+        covariance[:, block, block] += root @ root.transpose(0, 2, 1)
     return covariance
 
 
 def compute_whitening(
-    observations: Observations, jacobian: np.ndarray | None, noise: Noise
+    observations: Observations,
+    jacobian: np.ndarray | None,
+    noise: Noise,
+    roots: np.ndarray | None = None,
 ) -> Whitening:
     """Compute the whitening of averaged observations.
 
@@ -297,14 +305,19 @@ def compute_whitening(
         With respect to the joints. It is not needed if the noise has no joint error.
     noise : Noise
         Of a single measurement.
+    roots : (M, rows, rows) array, optional
+        Of the covariances of single measurements, see `compute_sensor_roots`; needed if
+        they are not all alike.
     """
     rows = observations.rows
     repeats = observations.states.repeats[observations.state]
     if not noise.has_joint_error:
-        root = np.sqrt(repeats)
-        if observations.spread is not None:
-            root = root / observations.spread
-        factors = (root[:, None] / noise.sensor_std(rows))[..., None] * np.eye(rows)
+        if roots is None:
+            factors = (np.sqrt(repeats)[:, None] / noise.sensor_std(rows))[
+                ..., None
+            ] * np.eye(rows)
+        else:
+            factors = np.sqrt(repeats)[:, None, None] * np.linalg.inv(roots)
         return Whitening(((np.arange(len(factors))[:, None], factors),))
     assert jacobian is not None
     group = observations.cluster if noise.pose_rad else observations.state
@@ -324,7 +337,7 @@ def compute_whitening(
                 noise,
                 of_members,
                 rows,
-                None if observations.spread is None else observations.spread[members],
+                None if roots is None else roots[members],
             )
             + pose_covariance
         )
@@ -444,15 +457,11 @@ class LeastSquaresProblem:
             if block.linear_model is not None:
                 block.conditions = block.linear_model.conditions
                 block.joint_jacobian = block.linear_model.joint_jacobian
-                block.whitening = compute_whitening(
-                    block.observations, block.joint_jacobian, self.noise
-                )
+                block.whitening = self._compute_whitening(block, block.joint_jacobian)
             elif not block.whitening.blocks and self.noise.has_joint_error:
                 self._linearize_block(block)
             elif not block.whitening.blocks:
-                block.whitening = compute_whitening(
-                    block.observations, None, self.noise
-                )
+                block.whitening = self._compute_whitening(block, None)
 
     def normal_equations(
         self, weights: np.ndarray, reused_gram: np.ndarray | None = None
@@ -605,10 +614,16 @@ class LeastSquaresProblem:
             self.model, self.estimate, block.observations, conditions
         )
         block.coordinates = linear_model.coordinates
-        block.whitening = compute_whitening(
-            block.observations, linear_model.joint_jacobian, self.noise
-        )
+        block.whitening = self._compute_whitening(block, linear_model.joint_jacobian)
         return linear_model
+
+    def _compute_whitening(
+        self, block: _ProblemBlock, jacobian: np.ndarray | None
+    ) -> Whitening:
+        roots = compute_sensor_roots(
+            self.model, self.estimate, block.observations, self.noise
+        )
+        return compute_whitening(block.observations, jacobian, self.noise, roots)
 
 
 def _map_to_rotation_vectors(residual: np.ndarray) -> np.ndarray:

@@ -81,6 +81,24 @@ class Prediction:
     by_unknowns: np.ndarray
 
 
+@dataclass(frozen=True)
+class NoiseShape:
+    """Shape of the noise of M measurements of r numbers, whose sizes are estimated.
+
+    Attributes
+    ----------
+    axes : (M, r, r) array, effect of a unit of each error on the residual, in the axes
+        of the session.
+    sizes : (M, r) array, standard deviation of each error over that of its group.
+    groups : (r,) int array, group of each error, 0 .. G-1; each group has a standard
+        deviation that is estimated.
+    """
+
+    axes: np.ndarray
+    sizes: np.ndarray
+    groups: np.ndarray
+
+
 class Kind:
     """One kind of measurement. A subclass with the attributes below is all it needs.
 
@@ -127,6 +145,13 @@ class Kind:
     ) -> tuple[np.ndarray, np.ndarray | None]:
         """Convert measurements (N, 3), (N, 3, 3) to poses of the target in the session."""
         return position, rotation
+
+    def shape_noise(
+        self, position: np.ndarray, rotation: np.ndarray, options: Mapping[str, Any]
+    ) -> NoiseShape | None:
+        """Describe noise that is neither alike in all measurements nor in all
+        directions, for measured poses (M, 3), (M, 3, 3) of the target."""
+        return None
 
     def unknowns(self, feature: Feature) -> tuple[Unknown, ...]:
         """List the K unknowns of a feature, in the order of steps of a fit."""

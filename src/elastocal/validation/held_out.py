@@ -23,6 +23,7 @@ from elastocal.fitting.least_squares import (
 from elastocal.fitting.linearization import linearize_coordinates
 from elastocal.fitting.model import compute_residuals, evaluate_conditions
 from elastocal.fitting.observations import select_states, split_into_blocks
+from elastocal.fitting.sensor_noise import compute_sensor_roots
 from elastocal.validation.transfer import place_unseen_sessions
 
 if TYPE_CHECKING:
@@ -259,7 +260,10 @@ def compute_noise_floor(
         return float("nan")
     total = 0.0
     for _, _, block in split_into_blocks(observations, len(fitted.unidentifiable)):
-        variance = np.full((len(block), 3), noise.position_m**2)
+        variance = np.full((len(block), min(block.rows, 3)), noise.position_m**2)
+        roots = compute_sensor_roots(model, estimate, block, noise)
+        if roots is not None:
+            variance = (roots[:, :3] ** 2).sum(axis=2)
         if noise.joint_rad.any():
             conditions = evaluate_conditions(model, estimate, block.states)
             linear_model = linearize_coordinates(model, estimate, block, conditions)

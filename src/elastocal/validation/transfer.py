@@ -341,7 +341,7 @@ def _variances_of_unseen(
         sensitivities = sensitivities[..., sensitivities.shape[-1] - count :]
         rows = (sensitivities * scale).reshape(-1, count)
         squares = ((rows @ root.T) ** 2).sum(axis=1)
-        variances[indices] = squares.reshape(len(block), 3).sum(axis=1)
+        variances[indices] = squares.reshape(len(block), -1).sum(axis=1)
     return variances
 
 

@@ -149,5 +149,6 @@ def see_board(
     shift = np.array([across, across, along]) * workshop.draws.standard_normal(3)
     tilt = across / board_m * max(range_m / board_m, 1.0)
     turn = np.array([tilt, tilt, across / board_m]) * workshop.draws.standard_normal(3)
-    seen = Rotation.from_rotvec(turn) * Rotation.from_matrix(turned)
+    # The board turns by these errors about its own axes, least about its normal.
+    seen = Rotation.from_matrix(turned) * Rotation.from_rotvec(turn)
     return in_camera + shift, seen.as_rotvec()
