@@ -21,7 +21,6 @@ DOCUMENT = {
     "camera": "on_robot",
     "frame": "unknown",
     "targets": {"tip": {"point": END, "offset_m": "unknown", "rotation": "unknown"}},
-    "noise": {"position_m": 2e-4, "orientation_rad": 1e-3},
 }
 
 
@@ -36,7 +35,9 @@ def folder(tmp_path):
     for _ in range(80):
         angles = workshop.draw_angles()
         seen, vector = see_board(workshop, angles, board, 2e-4, 0.2)
-        columns = dict(zip(("x", "y", "z", "rx", "ry", "rz"), [*seen, *vector], strict=True))
+        columns = dict(
+            zip(("x", "y", "z", "rx", "ry", "rz"), [*seen, *vector], strict=True)
+        )
         rows.append({"angles": angles, **columns})
     return write_contacts(tmp_path / "cell", DOCUMENT, rows)
 

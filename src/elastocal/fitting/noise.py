@@ -587,20 +587,21 @@ def estimate_shaped_noise(case: Case) -> ShapedNoise | None:
     Fits of the declared model and estimates of the factors alternate. What the model
     lacks counts as noise here; a diagnosis estimates the level of the noise again.
 
-    Returns None if the kind states no shape.
+    Returns None if the kind states no shape, or if the campaign declares its noise.
     """
     plan = case.campaign.measuring
     kind = plan.kinds[0]
     observations = case.observations
-    if plan.channels or observations.rotation is None or not len(observations):
+    is_declared = _read_declared_noise(case.campaign) is not None
+    if plan.channels or is_declared or not len(observations):
+        return None
+    if observations.rotation is None:
         return None
     options = {"camera": plan.camera}
     if not kind.shape_noise(observations.position, observations.rotation, options):
         return None
-    declared = _read_declared_noise(case.campaign)
     joints = np.zeros(case.campaign.robot.joints)
-    assumed = Noise("residual", _ASSUMED_NOISE, _ASSUMED_NOISE, joints)
-    noise = declared or assumed
+    noise = Noise("residual", _ASSUMED_NOISE, _ASSUMED_NOISE, joints)
     model = case.model
     shaped = ShapedNoise(kind, plan.camera, np.ones(1))
     for _ in range(_SHAPE_ROUNDS):
@@ -613,7 +614,7 @@ def estimate_shaped_noise(case: Case) -> ShapedNoise | None:
         residual = (frame @ vectors).reshape(len(observations), 6)
         shaped = estimate_factors(shaped, observations, residual)
         model = replace(model, shaped_noise=shaped)
-        noise = declared or replace(assumed, position_m=shaped.reference_m)
+        noise = replace(noise, position_m=shaped.reference_m)
     return shaped
 
 

@@ -13,6 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.application.identifiability import (
+    describe_unseen_errors,
+    find_unseen_errors,
+    predict_tip_error,
+)
 from elastocal.application.pose_counts import warn_of_few_poses
 from elastocal.campaigns.campaign import tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
@@ -39,7 +44,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from elastocal.campaigns.campaign import Measurements
+    from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.diagnosis.fitted_subset import FittedSubset
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case
@@ -134,6 +139,11 @@ def inspect_case(whole: Case, held_out: Measurements) -> Overview:
         *_describe_untestable(untestable),
     ]
     attention = [fault.detail for fault in data_faults]
+    if not is_tracked(case.campaign):
+        rows += _describe_tip(declared, case)
+        attention += describe_unseen_errors(
+            find_unseen_errors(declared, case.observations)
+        )
     negative = _find_negative_compliances(declared)
     # A negative compliance means that the model lacks something, so the search for
     # misplaced frames would mistake it for one.
@@ -150,6 +160,25 @@ def inspect_case(whole: Case, held_out: Measurements) -> Overview:
     attention += _list_shortcomings(case, declared, training, held_out)
     attention += warn_of_repeated_poses(training, held_out)
     return Overview(case.campaign.name, not data_faults, testable, rows, attention)
+
+
+def is_tracked(campaign: Campaign) -> bool:
+    """Whether all measurements are positions or poses of an instrument, which sees all
+    of the target in one frame."""
+    return {kind.name for kind in campaign.measuring.kinds} <= {"position", "pose"}
+
+
+def _describe_tip(declared: Fit, case: Case) -> list[tuple[str, str]]:
+    """Return a row on the predicted error of the tip, which is not what was measured;
+    none if the declared model has no parameter of the robot."""
+    error_m = predict_tip_error(declared, case.observations)
+    if error_m is None:
+        return []
+    words = (
+        f"{1e3 * error_m:.3f} mm RMS predicted for the position of the target by the"
+        " uncertainty of the declared model, after the best placement of base and tool"
+    )
+    return [("tip", words)]
 
 
 def _describe_noise(noise: Noise) -> str:
@@ -211,12 +240,16 @@ def _describe_measurements(
         loads = f"{format_count(load_count, 'load')} of up to {max_force:,.0f} N"
     joints = format_count(campaign.robot.joints, "joint")
     targets = ", ".join(target.name for target in campaign.targets)
+    kinds = " and ".join(kind.name for kind in campaign.measuring.kinds)
+    frame = f"the {campaign.frame} frame"
+    if campaign.measuring.channels and campaign.frame == "tracker":
+        frame = "a frame that is fitted in each session"
     fitted_poses = format_count(_count_poses(training), "pose")
     validation_poses = format_count(_count_poses(held_out), "validation pose")
     measurements = format_count(len(training), "measurement")
     return [
         ("read", f"{campaign.name}: {campaign.robot.name}, {joints}"),
-        ("", f"{campaign.measured} of {targets} in the {campaign.frame} frame"),
+        ("", f"{kinds} of {targets} in {frame}"),
         ("", f"{fitted_poses} to fit and {validation_poses} in {sessions}"),
         ("", f"{measurements}, up to {max_repeats} of a state, {loads}"),
     ]
