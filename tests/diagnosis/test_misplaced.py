@@ -143,4 +143,4 @@ def test_the_reference_point_is_described_with_the_declared_offset_of_its_target
     case, _ = read_cases(folder, ROBOTS)
     sentence = describe_reference_point(case.campaign)
     assert "6DoF" in sentence
-    assert "(100.0, 0.0, 50.0) mm of it, known to 0.2 mm" in sentence
+    assert "offset (100.0, 0.0, 50.0) mm, known to 0.2 mm" in sentence
