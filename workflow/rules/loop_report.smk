@@ -80,6 +80,40 @@ rule draw_hero:
         "../scripts/draw_hero.py"
 
 
+rule draw_sockets:
+    """The picture of the pages about calibration without a laser tracker."""
+    input:
+        descriptions=rules.read_campaign.output.descriptions,
+        verdict=rules.judge_campaign.output.verdict,
+        residuals=rules.judge_campaign.output.residuals,
+    output:
+        pdf="reports/loop/{campaign}/figures/sockets.pdf",
+        png=shown(
+            "reports/loop/{campaign}/figures/sockets.png",
+            "loop_hero",
+            "Campaigns",
+            campaign="{campaign}",
+            shows="Ball in its socket before and after",
+            kind="figure",
+        ),
+    script:
+        "../scripts/draw_sockets.py"
+
+
+rule camera_pictures:
+    """Picture and tables of docs/no_tracker.md, from a finished `cameras`."""
+    input:
+        sources=[
+            "reports/loop/panda_2_sockets/figures/sockets.png",
+            "reports/loop/panda_2_sockets/before_after.csv",
+            "reports/loop/fr3_board/before_after.csv",
+        ],
+    output:
+        copies=["docs/no_tracker.png", "docs/panda_2_sockets.csv", "docs/fr3_board.csv"],
+    script:
+        "../scripts/copy_into_docs.py"
+
+
 # Files of a finished run by the names of their copies in docs: the pictures of the
 # pages, and the tables with which tests compare the numbers on the pages.
 COPIES_IN_DOCS = (

@@ -108,7 +108,7 @@ def describe_sockets(
     """
     joints = recordings[0].angles.shape[1]
     sockets = sorted({recording.socket for recording in recordings})
-    document = {
+    document: dict[str, Any] = {
         "campaign": name,
         "robot": robot,
         "measured": "point",
