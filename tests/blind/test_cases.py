@@ -183,7 +183,9 @@ def test_each_setting_makes_a_campaign_that_can_be_read(tmp_path, setting):
     assert bool(campaign.robot.masses) == (setting != "weight_compensated")
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))]
+)
 def test_each_group_has_its_defects_at_the_right_joints(seed):
     [(gear_defect, _)] = draw_sized_defects(
         make_case(("stiffening",), (200.0,), seed=seed, group="gear_gravity")

@@ -226,8 +226,8 @@ def test_a_lost_held_out_row_changes_neither_the_training_poses_nor_the_verdict(
             tmp_path / str(number), number
         )
         assert_training_rows_are_equal(clean, damaged, number)
-        # Diagnose only the first campaigns, one without and one with loads.
-        if number < 2:
+        # Diagnose only one campaign; the slow test diagnoses forty.
+        if number == 1:
             assert_verdicts_are_equal(clean, damaged, lost_row, number)
 
 

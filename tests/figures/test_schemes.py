@@ -40,12 +40,30 @@ for description, chain in CHAINS.items():
         "compliance_urad_per_Nm": [1.0] * joint_count,
     }
     ROBOTS[description] = parse_robot(document)
-each_robot = pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
+# Pages of `make paper` and of the study show these robots.
+SHOWN = ("kuka", "fanuc", "kuka_extended", "ur5")
+
+
+def mark_unshown(name):
+    """Mark a robot that no page shows: it is drawn only with the slow tests."""
+    return [] if name in (*SHOWN, *CHAINS) else [pytest.mark.slow]
+
+
+each_robot = pytest.mark.parametrize(
+    "robot",
+    [
+        pytest.param(robot, id=name, marks=mark_unshown(name))
+        for name, robot in ROBOTS.items()
+    ],
+)
 # The layout has a known fault: six shifts of a few millimetres between the joints of the
 # Gen3 crowd its names. No page shows the scheme of this robot.
 CROWDED = pytest.param(
     ROBOTS["gen3"],
-    marks=pytest.mark.xfail(strict=True, reason="names of tiny shifts crowd"),
+    marks=[
+        pytest.mark.slow,
+        pytest.mark.xfail(strict=True, reason="names of tiny shifts crowd"),
+    ],
     id="gen3",
 )
 each_legible = pytest.mark.parametrize(
@@ -53,7 +71,7 @@ each_legible = pytest.mark.parametrize(
     [
         CROWDED,
         *(
-            pytest.param(robot, id=name)
+            pytest.param(robot, id=name, marks=mark_unshown(name))
             for name, robot in ROBOTS.items()
             if name != "gen3"
         ),

@@ -111,6 +111,7 @@ rule read_large_file:
 """
 
 
+@pytest.mark.slow
 def test_a_large_file_counts_by_its_contents_too(tmp_path):
     (tmp_path / "Snakefile").write_text(READS_LARGE_FILE, encoding="utf-8")
     large_file = tmp_path / "large.bin"
