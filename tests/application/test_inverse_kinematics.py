@@ -138,6 +138,25 @@ def test_a_robot_with_calibrated_axes_starts_from_the_closed_form(name, monkeypa
     assert not find_beyond_limits(robot, path).any()
 
 
+def test_a_target_that_the_nearest_arm_does_not_reach_is_solved_from_its_neighbours(
+    monkeypatch,
+):
+    """The postures of an arm with calibrated axes come from the nearest arm that has a
+    closed form, which may miss some or all of them."""
+    robot = analysed("kuka")
+    robot = replace(robot, chain=perturb_axes(robot.chain, 5e-4))
+    wanted = interpolate_path(robot, 60)
+    solve = inverse_kinematics._solve_in_closed_form
+
+    def miss_a_target(*arguments):
+        solutions = solve(*arguments)
+        solutions.error_m[:, 30] = np.inf
+        return solutions
+
+    monkeypatch.setattr(inverse_kinematics, "_solve_in_closed_form", miss_a_target)
+    assert_solved_in_allowed_steps(robot, wanted)
+
+
 def test_a_path_through_an_aligned_wrist_of_parallel_axes_is_continued():
     """With joint 5 at zero axis 6 is parallel to axes 2 to 4: any angle of joint 6 has
     the orientation, but few of them the position."""

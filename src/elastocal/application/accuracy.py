@@ -45,6 +45,8 @@ from elastocal.mechanics.kinematics import compute_jacobians
 from elastocal.verdict import Accuracy
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.fitting.model import Case
 
@@ -54,7 +56,7 @@ REGION = "the poses and loads that were fitted"
 # one correctly predicted campaign in twenty.
 CONFIDENCE = 0.95
 # Number of simulated robots; it determines a risk of 5 % to half a percent.
-_DRAWS = 2000
+DRAWS = 2000
 _SEED = 1
 # Ratio of the squared model-form error at the worst pose to its mean square. It is 7 to
 # 9 on simulated robots.
@@ -66,6 +68,10 @@ _MIN_RELATIVE_VARIANCE = 1e-4
 _BISECTIONS = 10
 # Poses for which the errors of all simulated robots are in memory at once.
 _CHUNK = 200
+# Chunks of poses whose repeatability is drawn anew. Further chunks take the random numbers
+# of the last of them again, each time for other robots: random numbers would take most of
+# the time of a long path, and a robot never meets one of them twice.
+_DRAWN_CHUNKS = 5
 # Upper bound on the states over which the accuracy of a campaign is stated; more states
 # do not change a printed digit.
 _MOST_STATES = 1000
@@ -129,7 +135,7 @@ def predict_errors(
     calibrated: CalibratedRobot,
     reported_angles: np.ndarray,
     wrench: np.ndarray,
-    draws: int = _DRAWS,
+    draws: int = DRAWS,
 ) -> ErrorPrediction:
     """Predict the errors of the corrected robot at commanded joint angles under loads.
 
@@ -144,17 +150,18 @@ def predict_errors(
     scope = calibrated.scope
     regression = _predict_regression_errors(calibrated, reported_angles, wrench)
     robots = _draw_robots(calibrated, draws)
-    chunks = [
-        _predict_chunk(
-            calibrated,
-            reported_angles[chunk],
-            wrench[chunk],
-            regression.select(chunk),
-            robots,
-        )
-        for chunk in split_into_chunks(len(reported_angles), _CHUNK)
-    ]
-    errors = _merge_chunks(chunks)
+    errors = _merge_chunks(
+        [
+            _predict_chunk(
+                calibrated,
+                reported_angles[chunk],
+                wrench[chunk],
+                regression.select(chunk),
+                repeating,
+            )
+            for chunk, repeating in robots.generate_repeats(len(reported_angles))
+        ]
+    )
     parameter_variance = np.diagonal(errors.parameter_covariance, axis1=1, axis2=2)
     repeat_variance = np.diagonal(errors.repeat_covariance, axis1=1, axis2=2)
     pose_variance = parameter_variance + repeat_variance
@@ -319,20 +326,53 @@ class _RandomRobots:
     repeatability_scale: np.ndarray
     joint_std_rad: np.ndarray
 
+    def generate_repeats(self, poses: int) -> Iterator[tuple[slice, _RepeatingRobots]]:
+        """Generate chunks of so many poses with the random errors of the joints there."""
+        draws = len(self.repeatability_scale)
+        normals = np.zeros(0)
+        for number, chunk in enumerate(split_into_chunks(poses, _CHUNK)):
+            size = min(chunk.stop, poses) - chunk.start
+            shift = number % max(draws, 1)
+            if number < _DRAWN_CHUNKS or shift == 0:
+                shape = (size, len(self.joint_std_rad), draws)
+                normals = self.stream.standard_normal(shape)
+                shift = 0
+            yield chunk, _RepeatingRobots(self, normals[:size], shift)
+
+
+@dataclass(frozen=True)
+class _RepeatingRobots:
+    """Random robots, and what the repeatability of their joints is at a chunk of K poses.
+
+    Attributes
+    ----------
+    robots : the robots.
+    normals : (K, n, draws) standard normal errors of the joints.
+    shift : the errors of a robot are those in the column this far behind its own.
+    """
+
+    robots: _RandomRobots
+    normals: np.ndarray
+    shift: int
+
     def simulate_errors(
         self, by_parameters: np.ndarray, by_repeats: np.ndarray
     ) -> np.ndarray:
         """Simulate position errors (K, 3, draws) from factors (K, 3, P) and (K, 3, n) of
-        their covariances."""
-        shape = (*by_repeats.shape[::2], len(self.repeatability_scale))
-        errors = by_repeats @ self.stream.standard_normal(shape)
-        errors *= self.repeatability_scale
+        their covariances. The robots are in the order of the columns of `normals`."""
+        errors = by_repeats @ self.normals
+        errors *= np.roll(self.robots.repeatability_scale, self.shift)
         # One product of two matrices is faster than one for each pose. The number of rows
         # is given, since a model without parameters leaves nothing to infer it from.
         rows = 3 * len(by_parameters)
         flat = by_parameters.reshape(rows, by_parameters.shape[2])
-        errors += (flat @ self.standard_normal).reshape(errors.shape)
+        parameters = np.roll(self.robots.standard_normal, self.shift, axis=1)
+        errors += (flat @ parameters).reshape(errors.shape)
         return errors
+
+    def restore_order(self, of_robots: np.ndarray) -> np.ndarray:
+        """Return values (draws,) in the order of the robots."""
+        return np.roll(of_robots, -self.shift)
 
 
 def _draw_robots(calibrated: CalibratedRobot, draws: int) -> _RandomRobots:
@@ -395,11 +435,12 @@ def _predict_chunk(
     reported_angles: np.ndarray,
     wrench: np.ndarray,
     regression: _RegressionErrors,
-    robots: _RandomRobots,
+    repeating: _RepeatingRobots,
 ) -> _ChunkErrors:
     """Predict the errors at a chunk of poses, and simulate those of random robots."""
     pose = predict_poses(calibrated, reported_angles, wrench)
     placed = _compute_placed_sensitivities(calibrated, reported_angles, wrench, pose)
+    robots = repeating.robots
     by_parameters = placed @ robots.covariance_factor
     robot = calibrated.robot
     angles = robot.model_angles(reported_angles)
@@ -411,7 +452,7 @@ def _predict_chunk(
     additional = np.maximum(
         regression.squares - np.trace(covariance, axis1=1, axis2=2), 0.0
     )
-    errors = robots.simulate_errors(by_parameters[:, :3], by_repeats[:, :3])
+    errors = repeating.simulate_errors(by_parameters[:, :3], by_repeats[:, :3])
     if regression.active.any():
         std = np.sqrt(additional[0] / 3.0)
         errors += std[:, None, None] * robots.stream.standard_normal(errors.shape)
@@ -421,8 +462,8 @@ def _predict_chunk(
         repeat_covariance,
         additional,
         _predict_left_out_errors(calibrated, reported_angles, wrench, pose),
-        squares.sum(axis=0),
-        squares.max(axis=0),
+        repeating.restore_order(squares.sum(axis=0)),
+        repeating.restore_order(squares.max(axis=0)),
     )
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.application.accuracy import (
+    DRAWS,
     ErrorPrediction,
     compute_uncorrected_errors,
     predict_errors,
@@ -88,7 +89,8 @@ class CorrectedPath:
     correction : joint targets.
     uncorrected_error_m, uncorrected_turn_rad : (N,) predicted errors of position and
         orientation of uncorrected targets.
-    prediction : predicted errors of the corrected targets.
+    prediction : predicted errors of the corrected targets; without those of simulated
+        robots over all targets if some have no bound.
     is_extrapolated : (N,) bool, joint angles or loads beyond those that were fitted.
     status : (N,) of str, "ok" or why no error bound is stated.
     large_steps : joints that move too far between targets, if the caller allowed them.
@@ -187,6 +189,7 @@ def correct_path(
     status[without_bound] = (
         f"{NO_BOUND}loads beyond {LOAD_FACTOR_WITH_BOUND:g} times the measured ones"
     )
+    has_gaps = bool((outside | without_bound).any())
     return CorrectedPath(
         calibrated,
         outcome,
@@ -196,7 +199,8 @@ def correct_path(
         *compute_uncorrected_errors(
             calibrated, wanted.position, wanted.rotation, correction.error_before
         ),
-        predict_errors(calibrated, commands, wrench),
+        # Without a bound at each target none is stated over all of them.
+        predict_errors(calibrated, commands, wrench, 0 if has_gaps else DRAWS),
         outside | overloaded,
         status,
         large_steps,
