@@ -3,7 +3,8 @@
 Usage: python benchmarks/corrections.py [ROBOT ...] [--targets 10000] [--runs 3]. Each
 robot is measured in a simulation at 60 random poses and diagnosed; the command then
 corrects the path of `target_path.py` by the robot's model file. Import and output are part
-of the seconds. Targets that the robot does not reach are left out.
+of the seconds; "slower" is how many times as long this machine takes for a fixed piece of
+work as the idle one of the limits. Targets that the robot does not reach are left out.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pandas as pd
-from common import ROOT, load_robot
+from common import compare_processor, load_robot
 from target_path import make_target_path
 
 import elastocal as ec
@@ -48,10 +49,10 @@ def write_model(robot: Robot, path: Path) -> None:
 def correct(folder: Path) -> tuple[float, pd.DataFrame]:
     """Run the command in a folder; return its CPU seconds and the targets."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    names = ["arm.json", "path.csv", "--output", "targets.csv"]
+    files = ["arm.json", "path.csv", "--output", "targets.csv"]
+    options = ["--partial", "--force", "--allow-large-steps"]
     subprocess.run(
-        [sys.executable, "-m", "elastocal", "correct", *names, "--partial", "--force"]
-        + ["--allow-large-steps"],
+        [sys.executable, "-m", "elastocal", "correct", *files, *options],
         cwd=folder,
         env=os.environ | {"OMP_NUM_THREADS": "1"},
         stdout=subprocess.DEVNULL,
@@ -79,10 +80,16 @@ def main() -> None:
             (folder / "arm.json").write_bytes(kept.read_bytes())
             path = make_target_path(name, options.targets)
             path.to_csv(folder / "path.csv", index=False)
+            slower = compare_processor()
             runs = [correct(folder) for _ in range(options.runs)]
-        seconds = [run[0] for run in runs]
-        corrected = int((runs[0][1]["status"] == OK).sum())
-        print(json.dumps({"robot": name, "cpu_s": seconds, "ok": corrected}))
+            slower = 0.5 * (slower + compare_processor())
+        line = {
+            "robot": name,
+            "cpu_s": [round(seconds, 2) for seconds, _ in runs],
+            "slower": round(slower, 2),
+            "ok": int((runs[0][1]["status"] == OK).sum()),
+        }
+        print(json.dumps(line), flush=True)
 
 
 if __name__ == "__main__":
