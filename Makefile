@@ -5,7 +5,7 @@ CORES ?= 2
 # The pins have every dependency, so none is looked for; compiled once, since an environment may forbid programs to do it as they run.
 INSTALL = $(BIN)/uv pip install -q --system-certs --compile-bytecode --python $(BIN)/python
 
-.PHONY: paper cameras study proof audit test test-slow test-slurm fuzz soak mutants lint catalogue bench pictures site supply dist installed lock clean
+.PHONY: paper cameras study proof audit test test-slow test-slurm fuzz soak mutants lint catalogue bench pictures site supply conda dist installed lock clean
 
 paper: .venv/ready
 	$(BIN)/snakemake -j$(CORES)
@@ -108,6 +108,12 @@ installed: dist
 	$(BIN)/uv pip install -q --no-deps --python .installed/env/bin/python dist/*.whl
 	work="$$(mktemp -d)" && cd "$$work" && OMP_NUM_THREADS=1 "$(CURDIR)/.installed/env/bin/elastocal" demo && rm -r "$$work"
 
+# The conda package of recipe/, built, installed in an empty environment and run there. Where conda-forge is not reached,
+# make conda CHANNELS=stand-in has empty packages with the names and versions of what is installed here.
+CHANNELS ?= conda-forge bioconda
+conda: .venv/ready .venv-conda/ready
+	OMP_NUM_THREADS=1 .venv-conda/bin/python workflow/conda_package.py --libraries $(BIN)/python $(CHANNELS:%=--channel %)
+
 # What the environment consists of, as CycloneDX, and what is known to be vulnerable in it: asks the vulnerability service of PyPI.
 supply: .venv/ready .venv-supply/ready
 	.venv-supply/bin/cyclonedx-py environment --pyproject pyproject.toml --output-reproducible -o sbom.cdx.json $(BIN)/python
@@ -125,9 +131,10 @@ lock:
 	uv pip compile pyproject.toml --all-extras --universal --python-version 3.11 --generate-hashes --no-header \
 	    -c requirements/audit.lock -c requirements/cluster.lock -o requirements/test.lock
 	uv pip compile --group supply --universal --python-version 3.11 --generate-hashes --no-header -o requirements/supply.lock
+	uv pip compile --group conda --universal --python-version 3.11 --generate-hashes --no-header -o requirements/conda.lock
 
 clean:
-	rm -rf .venv .venv-supply .snakemake data/simulated results/[a-z]* reports/[a-z]* site sbom.cdx.json
+	rm -rf .venv .venv-supply .venv-conda .snakemake data/simulated results/[a-z]* reports/[a-z]* site sbom.cdx.json
 
 # A file of its own: the interpreter in the environment is a link to an old one, which make would take for out of date for ever.
 .venv/made: requirements/install.lock
@@ -156,7 +163,12 @@ clean:
 	$(INSTALL) --no-deps --require-hashes -r requirements/test.lock
 	touch $@
 
-# An environment of its own for what looks at the environment from outside.
+# Environments of their own for what builds a package, and for what looks at the environment from outside.
+.venv-conda/ready: requirements/conda.lock | .venv/made
+	$(PYTHON) -m venv .venv-conda
+	$(BIN)/uv pip install -q --system-certs --python .venv-conda/bin/python --no-deps --require-hashes -r requirements/conda.lock
+	touch $@
+
 .venv-supply/ready: requirements/supply.lock | .venv/made
 	$(PYTHON) -m venv .venv-supply
 	$(BIN)/uv pip install -q --system-certs --python .venv-supply/bin/python --no-deps --require-hashes -r requirements/supply.lock
