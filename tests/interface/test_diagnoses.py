@@ -197,6 +197,12 @@ def test_a_robot_with_a_joint_that_follows_is_corrected_by_its_commands(linkage)
 
 
 @pytest.mark.slow
+def test_a_certificate_of_a_robot_with_a_joint_that_follows_is_decided(linkage):
+    _, _, result = linkage
+    assert result.robot.certify(tolerance_m=1e-2).decision == "pass"
+
+
+@pytest.mark.slow
 def test_files_of_a_robot_with_a_joint_that_follows_have_its_poses(linkage, tmp_path):
     """The written URDF by pinocchio, and the model file by the evaluator."""
     robot, _, result = linkage

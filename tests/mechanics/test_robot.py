@@ -42,6 +42,8 @@ def test_joints_that_follow_have_no_command(following):
     assert (following.joints, following.commands) == (3, 2)
     np.testing.assert_array_equal(following.leading_joints, [0, 2])
     np.testing.assert_array_equal(following.is_coupled, [True, True, False])
+    rail = robot_of("Rz(q1) Tx(1) Rz(q2) Tx(q3) [A]").chain
+    assert replace(following, chain=rail).prismatic_commands == (False, True)
     reported = np.array([[0.4, -0.3], [1.0, 0.0]])
     angles = following.model_angles(reported)
     np.testing.assert_allclose(angles, [[0.4, 0.0, -0.2], [1.0, -0.3, 0.1]])

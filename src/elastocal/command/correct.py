@@ -195,7 +195,7 @@ class _Program:
         """Return the controller's names of q1, q2, ..."""
         from elastocal.exchange.controllers import find_axes
 
-        return find_axes(self.controller, robot.chain.prismatic, self.stated_axes)
+        return find_axes(self.controller, robot.prismatic_commands, self.stated_axes)
 
     def describe(self, axis_names: tuple[str, ...]) -> str:
         """Say which controller reads the program, and what it calls the joints."""
@@ -247,7 +247,7 @@ def _write_targets(
         if program:
             targets = build_targets(
                 corrected.correction.joint_angles,
-                corrected.calibrated.robot.chain.prismatic,
+                corrected.calibrated.robot.prismatic_commands,
                 axis_names,
             )
             text = program.controller.program(

@@ -397,7 +397,7 @@ def find_units(
     for name in wanted:
         kinds = list_kinds(name)
         if robot and len(kinds) > 1:
-            kinds = (LENGTH if robot.chain.prismatic[int(name[1:]) - 1] else ANGLE,)
+            kinds = (LENGTH if robot.prismatic_commands[int(name[1:]) - 1] else ANGLE,)
         if kinds == (NONE,):
             continue
         is_length = kinds[0] == LENGTH

@@ -295,7 +295,7 @@ def _join_sheet(
     )
     joints = find_joints(joined.columns)
     units = {
-        name: "m" if robot and robot.chain.prismatic[number] else "rad"
+        name: "m" if robot and robot.prismatic_commands[number] else "rad"
         for number, name in enumerate(joints)
     }
     return _Source(

@@ -45,8 +45,7 @@ def unwrap_into_limits(
     angles = reported.copy()
     notes = []
     for joint, header in enumerate(headers):
-        leading = robot.leading_joints[joint]
-        if robot.chain.prismatic[leading] or not _counts_alone(robot, joint):
+        if robot.prismatic_commands[joint] or not _counts_alone(robot, joint):
             continue
         turns = _find_turns(reported, robot, joint)
         if turns.any():

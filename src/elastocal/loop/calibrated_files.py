@@ -342,7 +342,7 @@ def _describe_worst_pose(
     joints = [
         {"value": value, "unit": "m" if is_prismatic else "rad"}
         for value, is_prismatic in zip(
-            reported_angles[worst].tolist(), robot.chain.prismatic, strict=True
+            reported_angles[worst].tolist(), robot.prismatic_commands, strict=True
         )
     ]
     return {"joints": joints, "error_m": float(error_m[worst])}

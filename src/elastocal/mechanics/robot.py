@@ -170,6 +170,12 @@ class Robot:
         return np.array(leading)
 
     @property
+    def prismatic_commands(self) -> tuple[bool, ...]:
+        """Whether each reported joint is a translation, as its leading joint is."""
+        prismatic = self.chain.prismatic
+        return tuple(prismatic[joint] for joint in self.leading_joints)
+
+    @property
     def is_coupled(self) -> np.ndarray:
         """Whether a joint follows others or is followed, (n,) bool array. Such a joint
         has no copies whole turns away, because the others would move with it."""

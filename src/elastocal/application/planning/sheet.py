@@ -70,9 +70,7 @@ def _format_joints(survey: Survey, angles: np.ndarray) -> dict[str, float]:
     these rounded values in rad and m, so that what is typed is what is planned."""
     shown = {}
     exact = {}
-    robot = survey.robot
-    prismatic = np.array(robot.chain.prismatic)[robot.leading_joints]
-    joints = zip(angles, prismatic, strict=True)
+    joints = zip(angles, survey.robot.prismatic_commands, strict=True)
     for number, (angle, is_prismatic) in enumerate(joints, 1):
         unit = "mm" if is_prismatic else "deg"
         value = round(angle / DISPLAY_UNITS[unit], 3) + 0.0
