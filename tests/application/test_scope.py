@@ -5,6 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from contact_campaigns import (
+    build_contact_case,
+    fit_contacts,
+    open_workshop,
+    spread_places,
+    write_contacts,
+)
 from made_calibrated import make_calibrated_robot, plain_model
 from made_folders import make_folder, make_table
 from scipy.linalg import block_diag
@@ -14,6 +21,7 @@ from elastocal.application.accuracy import (
     predict_campaign_accuracy,
     predict_errors,
 )
+from elastocal.application.frames import ROBOT
 from elastocal.application.scope import calibrate_on_case, determine_scope
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import fit_model
@@ -21,6 +29,7 @@ from elastocal.fitting.noise import Noise
 from elastocal.loop.whole import read_cases
 from elastocal.mechanics.sites import build_sites
 from elastocal.residual_model.selection import is_commanded
+from elastocal_proof.plant.contacts import seat_in_socket
 
 STATES = make_states(6, 60)
 
@@ -110,3 +119,37 @@ def test_repeats_bound_the_repeatability_of_joints_that_the_sensor_hides(case):
     # out, and the same for all joints.
     joint_rad = calibrated.noise.joint_rad
     assert 0.0 < joint_rad[0] < 6e-5 and np.ptp(joint_rad) == 0.0
+
+
+def test_a_robot_that_touched_sockets_is_corrected_without_them_and_without_a_base(
+    tmp_path,
+):
+    workshop = open_workshop(3)
+    places = spread_places(workshop, 3)
+    rows = []
+    for row in range(45):
+        seat = seat_in_socket(workshop, places[row % 3], 5e-5)
+        rows.append({"angles": seat, "feature": f"socket{row % 3}"})
+    features = {f"socket{number}": {} for number in range(3)}
+    document = {"measured": "point", "features": features}
+    document["noise"] = {"position_m": 5e-5}
+    folder = write_contacts(tmp_path / "cell", document, rows)
+    fitted = fit_contacts(folder)
+    case = build_contact_case(folder)
+    robot = calibrate_on_case(
+        case, fitted.model, fitted.estimate, fitted.covariance, fitted.noise
+    )
+    assert robot.model.measuring is None
+    # Sockets anywhere say nothing of the base.
+    assert robot.scope.frame == ROBOT
+    states = case.observations.states
+    errors = predict_errors(robot, states.joint_angles, states.wrench)
+    assert np.isfinite(errors.position_m).all()
+    # What was fitted is what was touched: residuals are those of the contacts.
+    observed = robot.fit.observations
+    assert observed.channel is None
+    assert observed.position.shape == (len(observed), 3)
+    for number in range(3):
+        members = case.observations.channel == number
+        scatter = observed.position[members].std(axis=0)
+        np.testing.assert_allclose(scatter, 0.0, atol=1e-12)

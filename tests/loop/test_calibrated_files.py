@@ -10,12 +10,14 @@ import json
 import shutil
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 from analysed_robots import ROBOTS
 from certified import ENGINE
+from contact_campaigns import build_contact_case, write_contacts
 from made_calibrated import USUAL, make_calibrated_robot
 from made_remainders import NOISE_M
 from support import refused
@@ -237,3 +239,12 @@ def test_the_compliances_of_the_robot_file_contribute_their_deflection(fanuc, st
         == pytest.approx(expected)
         and expected > 1e-5
     )
+
+
+def test_contacts_certify_no_robot(tmp_path):
+    document = {"measured": "point", "features": {"socket": {}}}
+    rows = [{"angles": np.full(6, 0.1 * row), "feature": "socket"} for row in range(20)]
+    folder = write_contacts(tmp_path / "cell", document, rows)
+    campaign = SimpleNamespace(folder=folder, case=build_contact_case(folder))
+    with refused(folder.source, "measured", "point", "elastocal verify"):
+        build_certificate(campaign, 1e-3, 0.05)

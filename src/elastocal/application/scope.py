@@ -98,10 +98,23 @@ def _leave_features(fit: CampaignFit) -> CampaignFit:
         residual = compute_residuals(model, estimate, observations, conditions)
         position = position + residual[:, :3]
     placed = place_in_session(estimate, observations, position, rotation)
+    covariance = fit.covariance[np.ix_(kept, kept)]
+    plan = model.measuring
+    knows_base = plan is None or plan.states_places
+    has_unknown_base = not model.has_frame_parameters and not knows_base
+    if has_unknown_base:
+        # Features anywhere say nothing of the base: its axes are a convention.
+        frames = 6 * len(estimate.sessions)
+        covariance = np.pad(covariance, ((frames, 0), (frames, 0)))
     return CampaignFit(
-        replace(model, measuring=None, rows=6 if model.has_orientations else 3),
+        replace(
+            model,
+            measuring=None,
+            rows=6 if model.has_orientations else 3,
+            fitted_frames=model.fitted_frames or has_unknown_base,
+        ),
         replace(estimate, features=()),
-        fit.covariance[np.ix_(kept, kept)],
+        covariance,
         replace(
             observations,
             position=placed.position,

@@ -238,8 +238,22 @@ def build_certificate(
     -------
     dict
         JSON-serialisable.
+
+    Raises
+    ------
+    InputError
+        No instrument measured positions: contacts and boards are consistent with each
+        other, and say nothing of lengths.
     """
     document = campaign.folder.document
+    plan = campaign.case.campaign.measuring
+    if not plan.is_tracked:
+        allowed = (
+            "position or pose, measured by an instrument: only those show accuracy; "
+            "elastocal verify compares the corrected robot with such positions"
+        )
+        found = " and ".join(kind.name for kind in plan.kinds)
+        raise InputError(campaign.folder.source, "measured", found, allowed)
     calibrated = campaign.calibrated
     verdict = campaign.verdict
     heldout = verdict.heldout

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from elastocal.campaigns.campaign import Campaign, Measurements
+    from elastocal.campaigns.campaign import Measurements
     from elastocal.diagnosis.fitted_subset import FittedSubset
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case
@@ -139,7 +139,7 @@ def inspect_case(whole: Case, held_out: Measurements) -> Overview:
         *_describe_untestable(untestable),
     ]
     attention = [fault.detail for fault in data_faults]
-    if not is_tracked(case.campaign):
+    if not case.campaign.measuring.is_tracked:
         rows += _describe_tip(declared, case)
         attention += describe_unseen_errors(
             find_unseen_errors(declared, case.observations)
@@ -160,12 +160,6 @@ def inspect_case(whole: Case, held_out: Measurements) -> Overview:
     attention += _list_shortcomings(case, declared, training, held_out)
     attention += warn_of_repeated_poses(training, held_out)
     return Overview(case.campaign.name, not data_faults, testable, rows, attention)
-
-
-def is_tracked(campaign: Campaign) -> bool:
-    """Whether all measurements are positions or poses of an instrument, which sees all
-    of the target in one frame."""
-    return {kind.name for kind in campaign.measuring.kinds} <= {"position", "pose"}
 
 
 def _describe_tip(declared: Fit, case: Case) -> list[tuple[str, str]]:

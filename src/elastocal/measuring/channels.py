@@ -14,7 +14,7 @@ import numpy as np
 
 from elastocal.errors import InputError, suggest_names
 from elastocal.measuring.catalogue import list_kinds
-from elastocal.measuring.protocol import Feature, Kind
+from elastocal.measuring.protocol import UNKNOWN, Feature, Kind
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -69,6 +69,20 @@ class MeasuringPlan:
     def has_orientations(self) -> bool:
         """Whether any row states an orientation."""
         return any(kind.numbers == 6 for kind in self.kinds)
+
+    @property
+    def is_tracked(self) -> bool:
+        """Whether all measurements are positions or poses of an instrument, which has
+        lengths of its own."""
+        return {kind.name for kind in self.kinds} <= {"position", "pose"}
+
+    @property
+    def states_places(self) -> bool:
+        """Whether any row says where the target is in the frame of the session."""
+        return any(kind.reads_poses for kind in self.kinds) or any(
+            feature.stated.get("position_m", UNKNOWN) != UNKNOWN
+            for feature in self.features
+        )
 
     @property
     def columns(self) -> tuple[str, ...]:
