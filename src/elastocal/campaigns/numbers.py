@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.measurements import POSITION, ROTATION
 from elastocal.errors import suggest_names
@@ -96,11 +95,23 @@ def _read_poses(
     if kind.numbers == 3:
         return replace(measurements, position=position)
     rotation_vector = table.matrix(ROTATION)
+    if kind.is_converted:
+        position, rotation_vector = _convert_poses(
+            kind, position, rotation_vector, plan.camera
+        )
+    return replace(measurements, position=position, rotation_vector=rotation_vector)
+
+
+def _convert_poses(
+    kind: Kind, position: np.ndarray, rotation_vector: np.ndarray, camera: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Convert positions and rotation vectors (N, 3) to poses of the target."""
+    # Import scipy only here, because reading other campaigns does not need it.
+    from scipy.spatial.transform import Rotation
+
     rotation = Rotation.from_rotvec(rotation_vector).as_matrix()
-    converted, turned = kind.convert(position, rotation, {"camera": plan.camera})
-    if turned is not None and turned is not rotation:
-        rotation_vector = Rotation.from_matrix(turned).as_rotvec()
-    return replace(measurements, position=converted, rotation_vector=rotation_vector)
+    converted, turned = kind.convert(position, rotation, {"camera": camera})
+    return converted, Rotation.from_matrix(turned).as_rotvec()
 
 
 def _find_kinds(table: Cells, plan: MeasuringPlan) -> tuple[np.ndarray, np.ndarray]:

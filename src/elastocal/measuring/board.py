@@ -31,14 +31,13 @@ class Board(Pose):
     name = "board"
     meaning = "pose of a board in the camera's optical frame"
 
+    is_converted = True
+
     def convert(
-        self,
-        position: np.ndarray,
-        rotation: np.ndarray | None,
-        options: Mapping[str, Any],
-    ) -> tuple[np.ndarray, np.ndarray | None]:
+        self, position: np.ndarray, rotation: np.ndarray, options: Mapping[str, Any]
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Convert poses of the board in the camera to poses of the target."""
-        if options.get("camera", ON_ROBOT) == BESIDE_ROBOT or rotation is None:
+        if options.get("camera", ON_ROBOT) == BESIDE_ROBOT:
             return position, rotation
         inverse = rotation.transpose(0, 2, 1)
         return -(inverse @ position[..., None])[..., 0], inverse
@@ -56,7 +55,6 @@ class Board(Pose):
         """
         is_on_robot = options.get("camera", ON_ROBOT) == ON_ROBOT
         seen, turned = self.convert(position, rotation, options)
-        assert turned is not None
         range_m = np.linalg.norm(seen, axis=1)
         share = (range_m / np.median(range_m))[:, None]
         facing = np.abs((turned[:, :, 2] * seen).sum(axis=1)) / range_m

@@ -1,7 +1,6 @@
 """Pose of a target in the frame of the session, as a tracker of six components has it."""
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from elastocal.measuring.protocol import Kind, Prediction
 from elastocal.mechanics.kinematics import compute_pose_differences
@@ -23,6 +22,9 @@ class Pose(Kind):
         values: np.ndarray,
     ) -> Prediction:
         """Predict poses; see `Kind.evaluate`."""
+        # Import scipy only here, because reading a campaign does not need it.
+        from scipy.spatial.transform import Rotation
+
         count = len(position)
         measured = Rotation.from_rotvec(numbers[:, 3:6]).as_matrix()
         residual = compute_pose_differences(

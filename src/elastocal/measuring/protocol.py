@@ -109,6 +109,7 @@ class Kind:
     numbers : numbers in a row: 1, 3 or 6. Several numbers are components of a vector
         in the axes of the session, m, followed by those of a rotation, rad.
     columns : columns that the user writes for a row.
+    is_converted : whether poses that are read are not yet those of the target.
     touches : whether a table without its columns means zeros: contact.
     keys : keys of a feature of this kind, each with its meaning; None if rows refer to
         no feature.
@@ -118,6 +119,7 @@ class Kind:
     meaning: str
     numbers: int
     columns: Sequence[str] = ()
+    is_converted: bool = False
     touches: bool = False
     keys: ClassVar[Mapping[str, str] | None] = None
 
@@ -138,11 +140,8 @@ class Kind:
         self.unknowns(feature)
 
     def convert(
-        self,
-        position: np.ndarray,
-        rotation: np.ndarray | None,
-        options: Mapping[str, Any],
-    ) -> tuple[np.ndarray, np.ndarray | None]:
+        self, position: np.ndarray, rotation: np.ndarray, options: Mapping[str, Any]
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Convert measurements (N, 3), (N, 3, 3) to poses of the target in the session."""
         return position, rotation
 
