@@ -16,7 +16,7 @@ from itertools import permutations, product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+import scipy  # Import its optimizers lazily: few campaigns need them.
 from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.campaign import group_equal_rows
@@ -309,7 +309,9 @@ def _find_wrong_scale(campaign: Campaign) -> list[Fault]:
         # The misfit counts in the robot's metres, not in those of the camera.
         return float(misfit[0] / np.exp(log_factor))
 
-    best = minimize_scalar(compute_misfit, bounds=_LOG_SCALES, method="bounded")
+    best = scipy.optimize.minimize_scalar(
+        compute_misfit, bounds=_LOG_SCALES, method="bounded"
+    )
     factor = float(np.exp(best.x))
     if abs(best.x) < _NEAR_SCALE or best.fun > written[0] / _SCALE_BETTER:
         return []
