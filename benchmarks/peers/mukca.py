@@ -27,9 +27,9 @@ from elastocal.campaigns.socket_recordings import (
 )
 from elastocal.campaigns.writing import write_campaign
 from elastocal.exchange.urdf import robot_from_urdf
+from elastocal.fitting.cases import build_case
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import (
-    build_case,
     compute_residual_vectors,
     evaluate_conditions,
 )

@@ -7,9 +7,9 @@ from analysed_robots import ROBOTS
 
 from elastocal.campaigns.campaign import tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
+from elastocal.fitting.cases import build_case
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.linearization import compute_effect_sensitivities, linearize
-from elastocal.fitting.model import build_case
 from elastocal.fitting.noise import estimate_noise
 from elastocal.loop.loading import load_campaign
 from elastocal_proof.blind.cases import BlindCase, write_sealed_case

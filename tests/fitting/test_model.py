@@ -20,10 +20,10 @@ from synthetic import (
 from elastocal.campaigns.campaign import Campaign, Target, tabulate_measurements
 from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.protocol import Parameter
+from elastocal.fitting.cases import build_case
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import (
     apply_step,
-    build_case,
     build_declared_model,
     build_nominal_model,
     compute_residuals,

@@ -9,7 +9,7 @@ from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import generate_residual_blocks
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.model import build_case
+from elastocal.fitting.cases import build_case
 from elastocal.io.json_files import write_json
 from elastocal.io.storage import write_table
 from elastocal.loop import diagnosis_tables as tables

@@ -9,8 +9,8 @@ from elastocal.campaigns.campaign import tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.writing import write_campaign
+from elastocal.fitting.cases import build_case
 from elastocal.fitting.least_squares import fit_model
-from elastocal.fitting.model import build_case
 from elastocal.fitting.noise import estimate_noise
 from elastocal.loop.loading import load_campaign
 from elastocal.mechanics.kinematics import compute_point_poses

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.campaign import Campaign, assemble_campaign, build_measurements
-from elastocal.effects.catalogue import candidates_on, declared_candidates
+from elastocal.campaigns.campaign import Campaign
 from elastocal.effects.conditions import (
     MASS_PARAMETERS,
     Timeline,
@@ -45,12 +44,10 @@ from elastocal.mechanics.kinematics import (
     compute_point_poses,
     compute_pose_differences,
 )
-from elastocal.mechanics.robot_file import parse_robot
 from elastocal.mechanics.sites import Sites, build_sites
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
-    from typing import Any
+    from collections.abc import Iterable, Iterator, Sequence
 
     from elastocal.campaigns.campaign import Target
     from elastocal.effects.conditions import Conditions
@@ -722,47 +719,3 @@ class Case:
             campaign=replace(self.campaign, measurements=measurements),
             observations=average_repeats(remove_outlying_repeats(measurements)),
         )
-
-
-def build_case(
-    descriptions: Mapping[str, Any], columns: Mapping[str, np.ndarray]
-) -> Case:
-    """Build a case from the description of a campaign and its measurements table.
-
-    `descriptions` is as step 1 of the pipeline writes it, `columns` are those of the
-    table.
-    """
-    source = descriptions["source"]
-    robot = parse_robot(descriptions["robot"], source)
-    campaign = assemble_campaign(
-        descriptions["campaign"], robot, build_measurements(columns), source
-    )
-    return prepare_case(campaign, source)
-
-
-def prepare_case(campaign: Campaign, source: str) -> Case:
-    """Prepare the fit of a campaign; `source` is its file, for messages."""
-    sites = build_sites(campaign.robot)
-    model = build_declared_model(
-        campaign, declared_candidates(campaign.declared, sites, source)
-    )
-    candidates = {
-        key: candidate
-        for key, candidate in candidates_on(sites).items()
-        if candidate.effect not in campaign.declared
-    }
-    case = Case(
-        campaign,
-        average_repeats(remove_outlying_repeats(campaign.measurements)),
-        model,
-        candidates,
-    )
-    # Import the estimate only here, because fits import this module.
-    from elastocal.fitting.noise import estimate_shaped_noise
-
-    shaped = estimate_shaped_noise(case)
-    return (
-        case
-        if shaped is None
-        else replace(case, model=replace(model, shaped_noise=shaped))
-    )

@@ -19,7 +19,10 @@ from elastocal.campaigns.tables import Cells
 from elastocal.effects.catalogue import list_effects
 from elastocal.errors import InputError, suggest_names
 from elastocal.exchange.numbering import number_loads_and_repeats, number_poses
-from elastocal.fitting.model import Case, prepare_case
+from elastocal.fitting.cases import prepare_case
+from elastocal.fitting.model import (
+    Case,
+)
 from elastocal.interface.arrays import check_array
 from elastocal.io.documents import check_document
 from elastocal.loop.loading import (

@@ -14,11 +14,11 @@ from elastocal.diagnosis.diagnose import Diagnosis, Step, diagnose
 from elastocal.diagnosis.next_experiment import propose_experiment
 from elastocal.diagnosis.search import screen_terms
 from elastocal.diagnosis.settings import Settings
+from elastocal.fitting.cases import build_case
 from elastocal.fitting.features import state_features
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import (
     Estimate,
-    build_case,
     build_nominal_model,
     list_parameters,
 )

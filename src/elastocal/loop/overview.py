@@ -34,8 +34,8 @@ from elastocal.diagnosis.gross_errors import (
 )
 from elastocal.diagnosis.misplaced import find_misplaced_frames
 from elastocal.diagnosis.settings import Settings
+from elastocal.fitting.cases import build_case
 from elastocal.fitting.least_squares import compute_negative_compliances, fit_model
-from elastocal.fitting.model import build_case
 from elastocal.fitting.noise import count_effective_parameters
 from elastocal.loop.loading import load_campaign
 from elastocal.validation.transfer import warn_of_repeated_poses

@@ -25,8 +25,11 @@ from elastocal.diagnosis.diagnose import Diagnosis, diagnose
 from elastocal.diagnosis.model_averaging import compute_explained_squares
 from elastocal.diagnosis.settings import Settings
 from elastocal.errors import InputError
+from elastocal.fitting.cases import build_case
 from elastocal.fitting.least_squares import Fit
-from elastocal.fitting.model import Case, build_case
+from elastocal.fitting.model import (
+    Case,
+)
 from elastocal.fitting.noise import estimate_noise, fit_declared_model
 from elastocal.io.documents import Document
 from elastocal.io.json_files import read_json, write_json
