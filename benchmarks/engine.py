@@ -234,13 +234,14 @@ def _folds(measurements: int, repetitions: int) -> Row:
 
 def _regress(inputs: Inputs, residual: np.ndarray, *, shared: bool) -> None:
     """Fit the ridge regressions on all unions of three folds."""
-    folds = [slice(number, None, FOLDS) for number in range(FOLDS)]
-    parts = [inputs.select(fold) for fold in folds]
+    fold = np.arange(len(inputs)) % FOLDS
+    parts = [inputs.select(fold == number) for number in range(FOLDS)]
     for union in combinations(range(FOLDS), FOLDS - 2):
-        joined = Inputs.join([parts[number] for number in union])
-        if not shared:
-            joined = replace(joined, parts=())
-        rows = np.concatenate([residual[folds[number]] for number in union])
+        chosen = np.isin(fold, union)
+        joined = inputs.select(chosen)
+        if shared:
+            joined = replace(joined, parts=tuple(parts[number] for number in union))
+        rows = residual[chosen]
         for name in ("ridge_harmonics", "two_joints"):
             regression = REGRESSIONS[name]
             for _ in regression.fit(joined, rows, regression.settings, 1):

@@ -79,24 +79,14 @@ class Inputs:
         Displacement of the target by the joints first, then by base and links, m per rad
         or m; then by the effects of the model, see `selection.build_inputs`.
     parts : tuple of Inputs
-        From which these inputs were joined; empty if they were not.
+        Inputs that have these observations together, in any order, and whose Gram
+        matrices serve every union of them; empty if there are none.
     """
 
     joint_angles: np.ndarray
     covariates: np.ndarray
     jacobian: np.ndarray
     parts: tuple[Inputs, ...] = ()
-
-    @classmethod
-    def join(cls, parts: Sequence[Inputs]) -> Inputs:
-        """Join the observations of some parts, whose Gram matrices serve every union of
-        them."""
-        return cls(
-            np.concatenate([part.joint_angles for part in parts]),
-            np.concatenate([part.covariates for part in parts]),
-            np.concatenate([part.jacobian for part in parts]),
-            tuple(parts),
-        )
 
     def __len__(self) -> int:
         return len(self.joint_angles)
@@ -122,8 +112,8 @@ class Inputs:
     ) -> np.ndarray:
         """Sum a Gram matrix over the observations, some at a time, and store it.
 
-        Joined inputs add up the stored matrices of their parts. The cross-validation
-        fits unions of the same few folds, again and again.
+        Inputs with parts add up the stored matrices of these. The cross-validation fits
+        unions of the same few folds, again and again.
 
         Parameters
         ----------

@@ -507,33 +507,32 @@ def _choose_on_training(
 
 @dataclass(frozen=True)
 class _FoldedInputs:
-    """Inputs of K folds, of which unions are fitted.
+    """Inputs of M observations in K folds, of which unions are fitted.
 
     Attributes
     ----------
+    inputs : of all observations
+    members : (K, M) bool array, observations of each fold
     parts : inputs of each fold
-    observations : indices of their observations, int arrays
     """
 
+    inputs: Inputs
+    members: np.ndarray
     parts: list[Inputs]
-    observations: list[np.ndarray]
 
     @classmethod
     def of(cls, inputs: Inputs, folds: TrainingFolds) -> _FoldedInputs:
         """Divide the inputs of the training observations by their folds."""
-        members = [folds.fold == number for number in range(folds.count)]
-        return cls(
-            [inputs.select(mask) for mask in members],
-            [np.flatnonzero(mask) for mask in members],
-        )
+        members = folds.fold == np.arange(folds.count)[:, None]
+        return cls(inputs, members, [inputs.select(mask) for mask in members])
 
-    def join_without(self, left_out: Collection[int]) -> tuple[Inputs, np.ndarray]:
-        """Join all folds but some; the indices of the observations as well."""
+    def select_without(self, left_out: Collection[int]) -> tuple[Inputs, np.ndarray]:
+        """Inputs of all folds but some, and which observations these are, (M,) of
+        bool."""
         numbers = [n for n in range(len(self.parts)) if n not in left_out]
-        return (
-            Inputs.join([self.parts[number] for number in numbers]),
-            np.concatenate([self.observations[number] for number in numbers]),
-        )
+        chosen = np.asarray(self.members[numbers].any(axis=0))
+        parts = tuple(self.parts[number] for number in numbers)
+        return replace(self.inputs.select(chosen), parts=parts), chosen
 
 
 def choose_regression(
@@ -621,14 +620,14 @@ def _predict_outer_folds(
         best = _find_best_candidate(products[number].sum(axis=0))
         if best is None:
             continue
-        training_inputs, training = folded.join_without((number,))
+        training_inputs, training = folded.select_without((number,))
         predictor = _fit_setting(
             *candidates[best],
             training_inputs,
             folds.residual_without[number, training],
             seed,
         )
-        left_out = folded.observations[number]
+        left_out = folded.members[number]
         predicted[left_out] = predictor.mean(folded.parts[number])
         std[left_out] = predictor.std(folded.parts[number])
     return predicted, std
@@ -665,7 +664,7 @@ def _cross_validate(
         # Residuals of a model fitted without both folds, to first order in the changes
         # that leaving out each of them causes.
         residual = folds.residual_without[list(pair)].sum(axis=0) - folds.residual
-        training_inputs, training = folded.join_without(pair)
+        training_inputs, training = folded.select_without(pair)
         predictors = (
             predictor
             for name in settings
@@ -677,7 +676,7 @@ def _cross_validate(
             for outer, predicted in (pair, pair[::-1]):
                 mean = predictor.mean(folded.parts[predicted])
                 products[outer, predicted, number] = (
-                    (residual[folded.observations[predicted]] * mean).sum(),
+                    (residual[folded.members[predicted]] * mean).sum(),
                     (mean**2).sum(),
                 )
     return products
