@@ -191,11 +191,11 @@ def main() -> None:
             libraries = list_libraries(arguments.libraries)
             channels = [write_stand_in_channel(folder / "channel", libraries)]
         package = build_package(channels, folder / "built")
-        print("built", package.name)
+        print("built", package.name, flush=True)
         prefix = folder / "environment"
         built = (folder / "built").as_uri()
         names = asyncio.run(install_package([built, *channels], prefix))
-        print("installed", *names)
+        print("installed", *names, flush=True)
         environment = {"PATH": f"{prefix}/bin:{os.environ['PATH']}"}
         environment["OMP_NUM_THREADS"] = "1"
         for command in (

@@ -42,6 +42,7 @@ _NAMED = {"sidebar-drawer": "Pages", "toc-drawer": "On this page"}
 _EXAMPLES = (
     "first_calibration.py",
     "what_a_robot_lacks.py",
+    "no_tracker.py",
     "plan_and_correct.py",
     "own_effect.py",
     "mujoco_closed_loop.py",
