@@ -1,4 +1,4 @@
-"""Read what the rows of a campaign measured: numbers, kinds and features."""
+"""Read the numbers, kinds and features of the rows of a campaign."""
 
 from __future__ import annotations
 
@@ -37,37 +37,24 @@ def read_numbers(
     plan: MeasuringPlan,
     noise: Mapping[str, Any] | None,
 ) -> Measurements:
-    """Read what each row measured.
+    """Read the numbers that each row measured.
 
     Parameters
     ----------
-    measurements : N rows, without what was measured.
+    measurements : N rows, without their numbers.
     table : their table.
     plan : measuring plan of the campaign.
-    noise : declared noise, of which the spread of the measurements is taken.
+    noise : declared noise, which determines the spread of the measurements.
 
     Returns
     -------
     Measurements
-        N of them, or one for each number if rows have different numbers of them.
+        One for each row, or one for each number if kinds differ in their number of
+        components.
     """
     if not plan.channels:
         return _read_poses(measurements, table, plan)
-    kind_of_row, feature_of_row = _find_kinds(table, plan)
-    channels = np.full((len(measurements), 6), -1)
-    numbers = np.zeros((len(measurements), 6))
-    for kind_index, kind in enumerate(plan.kinds):
-        rows = np.flatnonzero(kind_of_row == kind_index)
-        if not len(rows):
-            continue
-        width = len(kind.columns)
-        names = [name for name in kind.columns if name in table.columns]
-        if len(names) == width and width:
-            numbers[rows, :width] = table.select(rows).matrix(names)
-        for feature in np.unique(feature_of_row[rows]).tolist():
-            of_feature = rows[feature_of_row[rows] == feature]
-            found = plan.find_channels(kind, None if feature < 0 else feature)
-            channels[of_feature, : len(found)] = found
+    channels, numbers = _read_components(table, plan)
     row, component = np.nonzero(channels >= 0)
     measurements = measurements.select(row)
     channel = channels[row, component]
@@ -84,6 +71,33 @@ def read_numbers(
         channel=channel,
         spread=_compute_spread(channel, plan, noise),
     )
+
+
+def _read_components(
+    table: Cells, plan: MeasuringPlan
+) -> tuple[np.ndarray, np.ndarray]:
+    """Read the channels of the N rows and the numbers that they measured.
+
+    Returns
+    -------
+    channels : (N, 6) int array, -1 where a row has no further channel.
+    numbers : (N, 6) array, m and rad, 0 where the table has no column.
+    """
+    kind_of_row, feature_of_row = _find_kinds(table, plan)
+    channels = np.full((len(kind_of_row), 6), -1)
+    numbers = np.zeros((len(kind_of_row), 6))
+    for kind_index, kind in enumerate(plan.kinds):
+        rows = np.flatnonzero(kind_of_row == kind_index)
+        if not len(rows):
+            continue
+        width = len(kind.columns)
+        if width and set(kind.columns) <= set(table.columns):
+            numbers[rows, :width] = table.select(rows).matrix(list(kind.columns))
+        for feature in np.unique(feature_of_row[rows]).tolist():
+            of_feature = rows[feature_of_row[rows] == feature]
+            indices = plan.find_channels(kind, None if feature < 0 else feature)
+            channels[of_feature, : len(indices)] = indices
+    return channels, numbers
 
 
 def _read_poses(
@@ -120,35 +134,55 @@ def _find_kinds(table: Cells, plan: MeasuringPlan) -> tuple[np.ndarray, np.ndarr
     A row that names no kind has that of its feature, or else the only kind that reads
     poses.
     """
-    count = len(table.rows)
-    kinds = table.texts("kind") if "kind" in table.columns else [""] * count
-    features = table.texts("feature") if "feature" in table.columns else [""] * count
-    names = [kind.name for kind in plan.kinds]
-    feature_names = [feature.name for feature in plan.features]
-    of_poses = [kind.name for kind in plan.kinds if kind.reads_poses]
-    kind_of_row = np.zeros(count, int)
-    feature_of_row = np.full(count, -1)
+    kinds = _read_optional(table, "kind")
+    features = _read_optional(table, "feature")
+    kind_of_row = np.zeros(len(kinds), int)
+    feature_of_row = np.full(len(kinds), -1)
     for row, (kind, feature) in enumerate(zip(kinds, features, strict=True)):
-        if feature and feature not in feature_names:
-            allowed = (
-                f"a feature of {_DOCUMENT}: {suggest_names(feature, feature_names)}"
-            )
-            raise table.fault(row, "feature", allowed)
-        if feature:
-            feature_of_row[row] = feature_names.index(feature)
-        implied = plan.features[feature_of_row[row]].kind if feature else ""
-        if not feature and len(of_poses) == 1:
-            implied = of_poses[0]
-        name = kind or implied
-        if name not in names:
-            column = "kind" if "kind" in table.columns else "feature"
-            allowed = f"a kind of `measured` of {_DOCUMENT}: {', '.join(names)}"
-            if column == "feature":
-                allowed = f"a feature of {_DOCUMENT}: {', '.join(feature_names)}"
-            raise table.fault(row, column, allowed)
-        kind_of_row[row] = names.index(name)
+        feature_index = _find_feature(table, row, feature, plan)
+        implied = _imply_kind(feature_index, plan)
+        kind_of_row[row] = _find_kind(table, row, kind or implied, plan)
+        feature_of_row[row] = -1 if feature_index is None else feature_index
         _check_feature(table, row, plan.kinds[kind_of_row[row]], implied)
     return kind_of_row, feature_of_row
+
+
+def _read_optional(table: Cells, column: str) -> list[str]:
+    """Read the texts of a column; empty texts if the table does not have it."""
+    if column in table.columns:
+        return list(table.texts(column))
+    return [""] * len(table.rows)
+
+
+def _find_feature(table: Cells, row: int, name: str, plan: MeasuringPlan) -> int | None:
+    """Find the index of the feature that a row names; None if it names none."""
+    if not name:
+        return None
+    names = [feature.name for feature in plan.features]
+    if name not in names:
+        allowed = f"a feature of {_DOCUMENT}: {suggest_names(name, names)}"
+        raise table.fault(row, "feature", allowed)
+    return names.index(name)
+
+
+def _imply_kind(feature_index: int | None, plan: MeasuringPlan) -> str:
+    """Name the kind of a row that states only its feature; empty if it is ambiguous."""
+    if feature_index is not None:
+        return plan.features[feature_index].kind
+    names = [kind.name for kind in plan.kinds if kind.reads_poses]
+    return names[0] if len(names) == 1 else ""
+
+
+def _find_kind(table: Cells, row: int, name: str, plan: MeasuringPlan) -> int:
+    """Find the index of a kind among those of the campaign."""
+    names = [kind.name for kind in plan.kinds]
+    if name in names:
+        return names.index(name)
+    if "kind" in table.columns:
+        allowed = f"a kind of `measured` of {_DOCUMENT}: {', '.join(names)}"
+        raise table.fault(row, "kind", allowed)
+    features = ", ".join(feature.name for feature in plan.features)
+    raise table.fault(row, "feature", f"a feature of {_DOCUMENT}: {features}")
 
 
 def _check_feature(table: Cells, row: int, kind: Kind, implied: str) -> None:

@@ -2,7 +2,8 @@
 
 This is the format of MUKCa [1]_: a folder for each place where the printed tool stood,
 with a file of joint angles for each of its sockets. Nothing else is measured. Each place
-is a session; a socket is a point that the ball touches, at a known distance from the next.
+is a session. A socket is a point that the ball touches; the distance between
+neighbouring sockets is known.
 
 References
 ----------
@@ -25,7 +26,8 @@ from elastocal.errors import InputError
 # Distance of neighbouring sockets of the tool that MUKCa prints.
 SOCKET_DISTANCE_M = 0.05
 TARGET = "ball"
-# What the makers of the tool measure of its printed distance with a caliper.
+# Standard deviation of the printed distance; the makers of the tool check it with a
+# caliper.
 DISTANCE_STD_M = 1.0e-4
 # Play of a printed ball in a printed socket; MUKCa reports 0.1 mm of repeatability.
 SOCKET_STD_M = 1.0e-4
@@ -33,7 +35,7 @@ SOCKET_STD_M = 1.0e-4
 _SOCKET_FILE = re.compile(r"hole_(\d)\.csv")
 _SOCKET_PATTERN = "hole_*.csv"
 _ALLOWED_FILE = "joint angles in rad separated by commas, one line for each pose"
-# No joint turns further, so that a larger number is an angle in degrees.
+# No joint turns further than this; a larger number is an angle in degrees.
 _LARGEST_ANGLE_RAD = 4 * np.pi
 
 
@@ -43,12 +45,12 @@ class Recording:
 
     Attributes
     ----------
-    place : where the tool stood.
+    stand : name of the place where the tool stood.
     socket : number of the socket, from 0.
     angles : (N, n) joint angles as the controller reported them, rad.
     """
 
-    place: str
+    stand: str
     socket: int
     angles: np.ndarray
 
@@ -72,9 +74,9 @@ def read_recording(path: str | Path) -> Recording:
     wrong = ~np.isfinite(angles) | (np.abs(angles) > _LARGEST_ANGLE_RAD)
     if wrong.any():
         row, joint = np.argwhere(wrong)[0]
-        found = f"{angles[row, joint]:g} for joint {joint + 1}"
+        angle = f"{angles[row, joint]:g} for joint {joint + 1}"
         allowed = "an angle in rad of at most two turns"
-        raise InputError(path, f"row {row + 1}", found, allowed)
+        raise InputError(path, f"row {row + 1}", angle, allowed)
     return Recording(path.parent.name, int(match[1]), angles)
 
 
@@ -147,20 +149,20 @@ def tabulate_recordings(recordings: Sequence[Recording]) -> dict[str, np.ndarray
     joints, or a place has one socket twice.
     """
     joints = recordings[0].angles.shape[1]
-    places = list(dict.fromkeys(recording.place for recording in recordings))
-    seen = set()
+    stands = list(dict.fromkeys(recording.stand for recording in recordings))
+    read_sockets = set()
     columns: dict[str, list[np.ndarray]] = {"session": [], "feature": [], "angles": []}
     for recording in recordings:
-        label = (recording.place, recording.socket)
-        source = f"{recording.place}/hole_{recording.socket}.csv"
+        label = (recording.stand, recording.socket)
+        source = f"{recording.stand}/hole_{recording.socket}.csv"
         if recording.angles.shape[1] != joints:
-            found = f"{recording.angles.shape[1]} angles in a line"
-            raise InputError(source, "", found, f"{joints}, as in the first file")
-        if label in seen:
+            width = f"{recording.angles.shape[1]} angles in a line"
+            raise InputError(source, "", width, f"{joints}, as in the first file")
+        if label in read_sockets:
             raise InputError(source, "", "the same socket twice", "each socket once")
-        seen.add(label)
+        read_sockets.add(label)
         count = len(recording.angles)
-        columns["session"].append(np.full(count, places.index(recording.place)))
+        columns["session"].append(np.full(count, stands.index(recording.stand)))
         columns["feature"].append(np.full(count, name_socket(recording.socket)))
         columns["angles"].append(recording.angles)
     angles = np.concatenate(columns["angles"])

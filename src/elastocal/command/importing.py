@@ -320,10 +320,10 @@ def sockets(
     files = [read_recording(path) for path in paths]
     table = tabulate_recordings(files)
     document = describe_sockets(folder.resolve().name, _ROBOT_FILE, files, distance)
-    places = len({recording.place for recording in files})
+    stands = len({recording.stand for recording in files})
     size = (
         f"{format_count(len(table['pose']), 'pose')} in {format_count(len(paths), 'socket')}"
-        f" at {format_count(places, 'place')}, {1e3 * distance:g} mm apart"
+        f" at {format_count(stands, 'place')}, {1e3 * distance:g} mm apart"
     )
     _write_campaign_folder(folder, document, table, arm.joints, robot, [size])
 

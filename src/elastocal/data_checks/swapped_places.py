@@ -1,6 +1,7 @@
 """Find measurements that name the wrong place: a ball that was in the other socket.
 
-Only nominal kinematics are needed, because sockets lie farther apart than a robot errs.
+Nominal kinematics suffice, because the distance between sockets is larger than the
+errors of a robot.
 """
 
 from __future__ import annotations
@@ -22,16 +23,18 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign
 
 POINT = "point"
-# A measurement belongs to another place if that one is nearer by this factor. Sockets of
-# MUKCa are 50 mm apart. Of nine arms measured in them, nominal models are off by up to
-# 26 mm, and the other socket is then 1.7 times as far away; five exchanged rows are named
-# in each of the 70 files.
+# A measurement belongs to another place if that place is nearer by this factor. The
+# sockets of MUKCa are 50 mm apart. The nominal models of the nine arms measured in them
+# are off by up to 26 mm; the wrong socket is then 1.7 times as far away. Five exchanged
+# rows are detected in each of the 70 files.
 _CLOSER = 1.6
-# Single wrong measurements are left to the diagnosis, which leaves them out; so many of a
-# place, and this share of them, are a file that was not changed in time.
+# The diagnosis rejects single wrong measurements. At least this many measurements of a
+# place, and at least this share of them, mean that the ball was moved to another socket
+# but the recording still named the first one.
 _FEWEST_ROWS = 3
 _SMALLEST_SHARE = 0.1
-# Steps of the reweighted fit, and the distance below which weights are equal.
+# Number of steps of the reweighted fit, and the distance, m, below which all
+# measurements have the same weight.
 _STEPS = 30
 _SMALLEST_M = 1e-3
 
@@ -43,21 +46,21 @@ class _Touches:
     Attributes
     ----------
     position, rotation : (N, 3) and (N, 3, 3), nominal poses of the measuring points.
-    target, place : (N,) int arrays; a place is one feature of one session.
-    label : session and feature of each place.
+    target, place_index : (N,) int arrays; a place is one feature of one session.
+    places : (G, 2) int array, session and feature of each place.
     """
 
     position: np.ndarray
     rotation: np.ndarray
     target: np.ndarray
-    place: np.ndarray
-    label: np.ndarray
+    place_index: np.ndarray
+    places: np.ndarray
 
 
 def find_swapped_places(campaign: Campaign) -> list[Fault]:
-    """Find places of whose measurements many fit another place of the same session.
+    """Find a place whose measurements often fit another place of the same session.
 
-    Returns at most one fault, of the place with most of them.
+    Returns at most one fault, for the place with the most such measurements.
     """
     channels = campaign.measuring.channels
     is_point = all(
@@ -67,26 +70,24 @@ def find_swapped_places(campaign: Campaign) -> list[Fault]:
         return []
     touches = _locate_touches(campaign)
     comparison = _compare_places(touches)
-    is_swapped = (comparison.own > IMPLAUSIBLE_M) & (
-        _CLOSER * comparison.other < comparison.own
-    )
-    sizes = np.bincount(touches.place)
-    counts = np.bincount(touches.place[is_swapped], minlength=len(sizes))
+    is_swapped = comparison.find_swapped()
+    sizes = np.bincount(touches.place_index)
+    counts = np.bincount(touches.place_index[is_swapped], minlength=len(sizes))
     worst = int(np.argmax(counts))
     if counts[worst] < max(_FEWEST_ROWS, _SMALLEST_SHARE * sizes[worst]):
         return []
-    rows = is_swapped & (touches.place == worst)
-    found = int(np.bincount(comparison.nearest[rows]).argmax())
+    rows = is_swapped & (touches.place_index == worst)
+    fitting = int(np.bincount(comparison.nearest[rows]).argmax())
     names = [
-        campaign.measuring.features[touches.label[number, 1]].name
-        for number in (worst, found)
+        campaign.measuring.features[touches.places[place_index, 1]].name
+        for place_index in (worst, fitting)
     ]
-    session = int(touches.label[worst, 0])
+    session = int(touches.places[worst, 0])
     detail = _describe(names, session, campaign.measurements.row[rows])
     value = Value("measurements", float(counts[worst]), "–")
     evidence = (
-        root_mean_square(comparison.own[rows]),
-        root_mean_square(comparison.other[rows]),
+        root_mean_square(comparison.from_named[rows]),
+        root_mean_square(comparison.from_nearest[rows]),
     )
     return [Fault("swapped_places", (), detail, (value,), evidence)]
 
@@ -97,15 +98,20 @@ class _Comparison:
 
     Attributes
     ----------
-    own : (N,) from the place that is named, m.
-    other : (N,) from the nearest other place of the same session, m; infinite if there
-        is none.
-    nearest : (N,) that other place.
+    from_named : (N,) array, distance from the place that the row names, m.
+    from_nearest : (N,) array, distance from the nearest other place of the same session,
+        m; infinite if there is none.
+    nearest : (N,) int array, index of this other place.
     """
 
-    own: np.ndarray
-    other: np.ndarray
+    from_named: np.ndarray
+    from_nearest: np.ndarray
     nearest: np.ndarray
+
+    def find_swapped(self) -> np.ndarray:
+        """Find the measurements (N,) that fit another place much better than theirs."""
+        is_closer = _CLOSER * self.from_nearest < self.from_named
+        return (self.from_named > IMPLAUSIBLE_M) & is_closer
 
 
 def _compare_places(touches: _Touches) -> _Comparison:
@@ -113,21 +119,27 @@ def _compare_places(touches: _Touches) -> _Comparison:
     places, position = _fit_places(touches)
     distance = np.linalg.norm(position[:, None] - places, axis=2)
     rows = np.arange(len(position))
-    session = touches.label[:, 0]
-    is_other = session[touches.place][:, None] == session
-    is_other[rows, touches.place] = False
-    others = np.where(is_other, distance, np.inf)
+    session = touches.places[:, 0]
+    is_alternative = session[touches.place_index][:, None] == session
+    is_alternative[rows, touches.place_index] = False
+    alternatives = np.where(is_alternative, distance, np.inf)
     return _Comparison(
-        distance[rows, touches.place], others.min(axis=1), others.argmin(axis=1)
+        from_named=distance[rows, touches.place_index],
+        from_nearest=alternatives.min(axis=1),
+        nearest=alternatives.argmin(axis=1),
     )
 
 
 def _describe(names: Sequence[str], session: int, rows: Sequence[int]) -> str:
-    """Sentence on the measurements of a place in a session that fit another one."""
-    name, other = names
+    """Describe the measurements of one place that fit another, in a sentence.
+
+    `names` are those of the named place and of the fitting one; `rows` are those of the
+    measurements in the table.
+    """
+    named, fitting = names
     return (
-        f"{format_count(len(rows), 'measurement')} of {name} in session {session} (rows"
-        f" {min(rows)} to {max(rows)}) fit {other}, as if the place had been changed and"
+        f"{format_count(len(rows), 'measurement')} of {named} in session {session} (rows"
+        f" {min(rows)} to {max(rows)}) fit {fitting}, as if the place had been changed and"
         " the name had not"
     )
 
@@ -135,25 +147,35 @@ def _describe(names: Sequence[str], session: int, rows: Sequence[int]) -> str:
 def _locate_touches(campaign: Campaign) -> _Touches:
     """Compute nominal poses of the measuring points, and group the places."""
     measurements = campaign.measurements
+    position, rotation = _compute_target_poses(campaign)
+    assert measurements.channel is not None
     channels = campaign.measuring.channels
+    feature = np.array([channel.feature for channel in channels], int)
+    session = measurements.session
+    if campaign.frame == "base":
+        # Places in the base frame stay the same from session to session.
+        session = np.zeros(len(measurements), int)
+    keys = np.column_stack([session, feature[measurements.channel]])
+    first, place_index = group_equal_rows(keys)
+    return _Touches(position, rotation, measurements.target, place_index, keys[first])
+
+
+def _compute_target_poses(campaign: Campaign) -> tuple[np.ndarray, np.ndarray]:
+    """Compute nominal positions (N, 3), m, and rotations (N, 3, 3) of the targets in the
+    base frame; a target with an unknown offset is on its measuring point."""
+    measurements = campaign.measurements
     count = len(measurements)
     position = np.zeros((count, 3))
     rotation = np.zeros((count, 3, 3))
     chain = campaign.robot.chain
-    for number, target in enumerate(campaign.targets):
-        rows = measurements.target == number
+    for index, target in enumerate(campaign.targets):
+        rows = measurements.target == index
         offset_m = target.offset_m or (0.0, 0.0, 0.0)
         point = replace(chain.point(target.point), offset_m=tuple(offset_m))
         position[rows], rotation[rows] = compute_poses(
             chain, measurements.joint_angles[rows], point
         )
-    assert measurements.channel is not None
-    feature = np.array([channel.feature for channel in channels], int)
-    stays = campaign.frame == "base"
-    session = np.zeros(count, int) if stays else measurements.session
-    keys = np.column_stack([session, feature[measurements.channel]])
-    first, place = group_equal_rows(keys)
-    return _Touches(position, rotation, measurements.target, place, keys[first])
+    return position, rotation
 
 
 def _fit_places(touches: _Touches) -> tuple[np.ndarray, np.ndarray]:
@@ -169,30 +191,41 @@ def _fit_places(touches: _Touches) -> tuple[np.ndarray, np.ndarray]:
     .. [1] Weiszfeld, Sur le point pour lequel la somme des distances de n points donnés
        est minimum, Tôhoku Mathematical Journal 43, 1937.
     """
-    count = len(touches.place)
-    targets = touches.target.max() + 1
-    columns = np.zeros((count, 3, targets, 3))
-    columns[np.arange(count), :, touches.target] = touches.rotation
-    columns = columns.reshape(count, 3, 3 * targets)
-    weight = np.ones(count)
+    offset_columns = _list_offset_columns(touches)
+    weight = np.ones(len(touches.position))
     position = touches.position
-    places = np.zeros((len(touches.label), 3))
+    places = np.zeros((len(touches.places), 3))
     for _ in range(_STEPS):
-        total = np.bincount(touches.place, weight)
-        means = []
-        for values in (touches.position, columns):
-            sums = np.zeros((len(total), *values.shape[1:]))
-            shaped = weight.reshape(-1, *[1] * (values.ndim - 1))
-            np.add.at(sums, touches.place, shaped * values)
-            means.append(sums / total.reshape(-1, *[1] * (values.ndim - 1)))
+        mean_position = _average_places(touches.position, weight, touches.place_index)
+        mean_columns = _average_places(offset_columns, weight, touches.place_index)
         scale = np.sqrt(weight)[:, None]
-        design = (columns - means[1][touches.place]) * scale[..., None]
-        response = (touches.position - means[0][touches.place]) * scale
+        design = (offset_columns - mean_columns[touches.place_index]) * scale[..., None]
+        response = (touches.position - mean_position[touches.place_index]) * scale
         offsets = np.linalg.lstsq(
-            design.reshape(3 * count, -1), -response.ravel(), rcond=None
+            design.reshape(response.size, -1), -response.ravel(), rcond=None
         )[0]
-        position = touches.position + columns @ offsets
-        places = means[0] + means[1] @ offsets
-        distance = np.linalg.norm(position - places[touches.place], axis=1)
+        position = touches.position + offset_columns @ offsets
+        places = mean_position + mean_columns @ offsets
+        distance = np.linalg.norm(position - places[touches.place_index], axis=1)
         weight = 1.0 / np.maximum(distance, _SMALLEST_M)
     return places, position
+
+
+def _list_offset_columns(touches: _Touches) -> np.ndarray:
+    """Derivatives (N, 3, 3 T) of the positions in the offsets of the T targets."""
+    count = len(touches.position)
+    target_count = touches.target.max() + 1
+    columns = np.zeros((count, 3, target_count, 3))
+    columns[np.arange(count), :, touches.target] = touches.rotation
+    return columns.reshape(count, 3, 3 * target_count)
+
+
+def _average_places(
+    values: np.ndarray, weight: np.ndarray, place_index: np.ndarray
+) -> np.ndarray:
+    """Weighted means (G, ...) of values (N, ...) over the measurements of each place."""
+    by_row = (-1, *[1] * (values.ndim - 1))
+    total = np.bincount(place_index, weight)
+    sums = np.zeros((len(total), *values.shape[1:]))
+    np.add.at(sums, place_index, weight.reshape(by_row) * values)
+    return np.asarray(sums / total.reshape(by_row))

@@ -1,16 +1,16 @@
 """Poses of a board in a camera, from images.
 
-OpenCV finds the corners; the pose minimizes the squared distances between the corners and
-their projections. Its covariance is that of least squares, with the variance of these
-distances as the noise of a corner: it grows with the distance and the obliquity of the
-board by itself.
+OpenCV finds the corners. The pose minimizes the squared distances between the corners
+and their projections. Its covariance is the one of linear least squares, with the mean
+square of these distances as the variance of a corner. The stated uncertainty therefore
+grows with the range and the obliquity of the board.
 """
 
 from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,17 +27,18 @@ COLUMNS = (
     "std_x_m", "std_y_m", "std_z_m", "std_rx_rad", "std_ry_rad", "std_rz_rad",
 )  # fmt: skip
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm")
-# A pose has six numbers, and its noise is estimated from what is left.
+# A pose has six parameters; the noise is estimated from the remaining degrees of freedom.
 _FEWEST_CORNERS = 6
-# Corners of a sharp image are found to a tenth of a pixel; beyond this many pixels RMS
-# the board is bent, or the intrinsic parameters are of another camera or resolution.
+# In a sharp image, corners are found to a tenth of a pixel. An RMS residual above this
+# value means that the board is bent, or that the intrinsic parameters belong to another
+# camera or resolution.
 _LARGEST_RESIDUAL_PX = 2.0
-# A flat board that is seen from far away fits two poses. The better one counts only if
-# its residual is smaller by this factor.
+# Two poses fit a flat board that is far from the camera. The better one is accepted only
+# if its residual is smaller by this factor.
 _AMBIGUOUS_RATIO = 1.2
-# Two fits that end closer to each other are the same pose.
+# Two fits whose rotation vectors differ by less than this are the same pose.
 _SAME_POSE_RAD = 1e-3
-# Images from which intrinsic parameters are determined, at least.
+# Smallest number of images from which intrinsic parameters are determined.
 _FEWEST_IMAGES = 8
 
 
@@ -120,22 +121,20 @@ def detect_boards(
     """
     images = [_read_image(path) for path in paths]
     size = _find_size(paths, images, camera)
-    board = pattern.make_opencv_board()
-    corners = []
+    detected = []
     left_out = {}
-    for path, image in zip(paths, images, strict=True):
-        on_board, in_image = find_corners(image, pattern, board)
-        if len(on_board) < _FEWEST_CORNERS:
-            left_out[path.name] = f"{len(on_board)} corners"
+    for corners in _detect_corners(paths, images, pattern):
+        if len(corners.on_board) < _FEWEST_CORNERS:
+            left_out[corners.image] = f"{len(corners.on_board)} corners"
         else:
-            corners.append(ImageCorners(path.name, on_board, in_image))
+            detected.append(corners)
     if camera is None:
-        camera = _calibrate_camera(corners, size, paths)
+        camera = _calibrate_camera(detected, size, paths)
     poses = []
-    for seen in corners:
-        pose, reason = estimate_pose(seen, camera)
+    for corners in detected:
+        pose, reason = estimate_pose(corners, camera)
         if pose is None:
-            left_out[seen.image] = reason
+            left_out[corners.image] = reason
         else:
             poses.append(pose)
     if not poses:
@@ -145,8 +144,17 @@ def detect_boards(
     return Detection(poses, camera, left_out)
 
 
+def _detect_corners(
+    paths: Sequence[Path], images: Sequence[np.ndarray], pattern: BoardPattern
+) -> Iterator[ImageCorners]:
+    """Detect the corners of the board in each image; there may be none."""
+    board = pattern.make_opencv_board()
+    for path, image in zip(paths, images, strict=True):
+        yield ImageCorners(path.name, *find_corners(image, pattern, board))
+
+
 def estimate_pose(
-    seen: ImageCorners, camera: Camera
+    corners: ImageCorners, camera: Camera
 ) -> tuple[DetectedPose | None, str]:
     """Estimate the pose of the board in one image.
 
@@ -154,19 +162,19 @@ def estimate_pose(
     -------
     The pose, or None and the reason why there is none.
     """
-    best, *others = _fit_poses(seen, camera)
-    residual_px = float(np.sqrt(best.squares / len(seen.on_board)))
+    best, *alternatives = _fit_poses(corners, camera)
+    residual_px = float(np.sqrt(best.squares / len(corners.on_board)))
     if residual_px > _LARGEST_RESIDUAL_PX:
         return None, f"a residual of {residual_px:.1f} px"
-    for other in others:
-        is_close = np.allclose(other.rotation, best.rotation, atol=_SAME_POSE_RAD)
-        if not is_close and other.squares < _AMBIGUOUS_RATIO**2 * best.squares:
+    for alternative in alternatives:
+        is_same = np.allclose(alternative.rotation, best.rotation, atol=_SAME_POSE_RAD)
+        if not is_same and alternative.squares < _AMBIGUOUS_RATIO**2 * best.squares:
             return None, "two poses that fit as well"
     pose = DetectedPose(
-        seen.image,
+        corners.image,
         best.position,
         best.rotation,
-        len(seen.on_board),
+        len(corners.on_board),
         residual_px,
         _estimate_std(best.jacobian, best.rotation, best.squares),
     )
@@ -190,7 +198,7 @@ class _FittedPose:
     jacobian: np.ndarray
 
 
-def _fit_poses(seen: ImageCorners, camera: Camera) -> list[_FittedPose]:
+def _fit_poses(corners: ImageCorners, camera: Camera) -> list[_FittedPose]:
     """Fit both poses that a flat board may have [1]_, the better one first.
 
     References
@@ -200,8 +208,8 @@ def _fit_poses(seen: ImageCorners, camera: Camera) -> list[_FittedPose]:
     """
     import cv2
 
-    on_board = seen.on_board.astype(np.float64)
-    in_image = seen.in_image.astype(np.float64)
+    on_board = corners.on_board.astype(np.float64)
+    in_image = corners.in_image.astype(np.float64)
     lens = (camera.matrix, camera.distortion)
     _, rotations, positions, _ = cv2.solvePnPGeneric(
         on_board, in_image, *lens, flags=cv2.SOLVEPNP_IPPE
@@ -252,8 +260,8 @@ def find_images(folder: str | Path) -> list[Path]:
 
 def _split_name(path: Path) -> list[tuple[int, str]]:
     """Split a name into texts and numbers, so that image 10 comes after image 9."""
-    parts = re.split(r"(\d+)", path.stem)
-    return [(int(part), "") if part.isdigit() else (-1, part) for part in parts]
+    pieces = re.split(r"(\d+)", path.stem)
+    return [(int(text), "") if text.isdigit() else (-1, text) for text in pieces]
 
 
 def _read_image(path: Path) -> np.ndarray:
@@ -277,9 +285,9 @@ def _find_size(
     for path, image in zip(paths, images, strict=True):
         size = image.shape[::-1]
         if size != wanted:
-            found = f"{size[0]} x {size[1]} pixels"
+            pixels = f"{size[0]} x {size[1]} pixels"
             allowed = f"{wanted[0]} x {wanted[1]}, as the camera's other images"
-            raise InputError(path, "", found, allowed)
+            raise InputError(path, "", pixels, allowed)
     return wanted
 
 
@@ -306,17 +314,17 @@ def find_corners(
 
 
 def _calibrate_camera(
-    corners: Sequence[ImageCorners], size: tuple[int, int], paths: Sequence[Path]
+    detected: Sequence[ImageCorners], size: tuple[int, int], paths: Sequence[Path]
 ) -> Camera:
     """Determine the intrinsic parameters from the images of the board."""
     import cv2
 
-    if len(corners) < _FEWEST_IMAGES:
-        found = f"the board in {len(corners)} images"
+    if len(detected) < _FEWEST_IMAGES:
+        count = f"the board in {len(detected)} images"
         allowed = f"at least {_FEWEST_IMAGES} to calibrate the camera, or --intrinsics"
-        raise InputError(paths[0].parent, "", found, allowed)
-    on_board = [seen.on_board.astype(np.float32) for seen in corners]
-    in_image = [seen.in_image.astype(np.float32) for seen in corners]
+        raise InputError(paths[0].parent, "", count, allowed)
+    on_board = [corners.on_board.astype(np.float32) for corners in detected]
+    in_image = [corners.in_image.astype(np.float32) for corners in detected]
     no_start: Any = None
     _, matrix, distortion, _, _ = cv2.calibrateCamera(
         on_board, in_image, size, no_start, no_start

@@ -1,5 +1,5 @@
-"""What is printed on a board: a chessboard with markers (ChArUco) [1]_ or a grid of
-AprilTags [2]_, as ``board.yaml`` describes it.
+"""Printed pattern of a board, as ``board.yaml`` describes it: a chessboard with markers
+(ChArUco) [1]_ or a grid of AprilTags [2]_.
 
 References
 ----------
@@ -51,7 +51,7 @@ class BoardPattern:
 
     @property
     def size_m(self) -> tuple[float, float]:
-        """Width and height of what is printed."""
+        """Width and height of the printed pattern."""
         width = self.columns * self.square_m
         height = self.rows * self.square_m
         if self.kind == APRILTAG:
@@ -82,9 +82,9 @@ class BoardPattern:
         dictionary = aruco.getPredefinedDictionary(getattr(aruco, self.dictionary))
         available = len(dictionary.bytesList)
         if self.markers > available:
-            found = f"{self.markers} markers"
+            count = f"{self.markers} markers"
             allowed = f"at most {available}, which {self.dictionary} has"
-            raise InputError("board", "columns", found, allowed)
+            raise InputError("board", "columns", count, allowed)
         size = (self.columns, self.rows)
         if self.kind == CHARUCO:
             return aruco.CharucoBoard(size, self.square_m, self.marker_m, dictionary)
@@ -107,8 +107,8 @@ def read_pattern(path: str | Path) -> BoardPattern:
     check_document(document, "board", Path(path).as_posix())
     pattern = BoardPattern(**document)
     if pattern.marker_m >= pattern.square_m:
-        found = f"{pattern.marker_m:g} m"
-        raise InputError(path, "marker_m", found, f"less than {pattern.square_m:g}")
+        length = f"{pattern.marker_m:g} m"
+        raise InputError(path, "marker_m", length, f"less than {pattern.square_m:g}")
     return pattern
 
 

@@ -76,10 +76,10 @@ def check_poses(poses: BoardPoses) -> None:
             "metres; give millimetres with --lengths mm",
         ),
     )
-    for is_wrong, found, allowed in checks:
+    for is_wrong, problem, allowed in checks:
         if is_wrong.any():
             sample = int(np.argmax(is_wrong)) + 1
-            raise InputError(poses.source, f"sample {sample}", found, allowed)
+            raise InputError(poses.source, f"sample {sample}", problem, allowed)
 
 
 def tabulate_board_poses(poses: BoardPoses, camera: str) -> dict[str, np.ndarray]:

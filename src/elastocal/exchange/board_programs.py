@@ -73,8 +73,8 @@ def read_board_poses(
     elif poses.angles is not None and options.angles == "deg":
         poses = replace(poses, angles=np.radians(poses.angles))
     if poses.angles is not None and poses.angles.shape[1] != robot.commands:
-        found = f"{poses.angles.shape[1]} joint angles in a sample"
-        raise InputError(path, "", found, f"{robot.commands}, as the robot reports")
+        count = f"{poses.angles.shape[1]} joint angles in a sample"
+        raise InputError(path, "", count, f"{robot.commands}, as the robot reports")
     return poses
 
 
@@ -85,15 +85,15 @@ def _match_rows(poses: BoardPoses, joint_angles: JointAngles, path: Path) -> np.
         row_of_image = {image: row for row, image in enumerate(joint_angles.images)}
         missing = [image for image in poses.images if image not in row_of_image]
         if missing:
-            found = f"no row of {missing[0]}"
-            raise InputError(path, IMAGE, found, "a row for each image with a pose")
+            problem = f"no row of {missing[0]}"
+            raise InputError(path, IMAGE, problem, "a row for each image with a pose")
         return np.array([row_of_image[image] for image in poses.images])
     if len(joint_angles.angles) != count:
-        found = f"{len(joint_angles.angles)} rows of joint angles"
+        row_count = f"{len(joint_angles.angles)} rows of joint angles"
         allowed = f"{count}, one for each sample"
         if poses.images:
             allowed += f", or a column {IMAGE} with the names of the images"
-        raise InputError(path, "", found, allowed)
+        raise InputError(path, "", row_count, allowed)
     return np.arange(count)
 
 

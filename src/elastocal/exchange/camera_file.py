@@ -1,5 +1,7 @@
-"""Intrinsic parameters of a camera, in the file that ROS and OpenCV's tools write
-(camera_info): ``camera_matrix`` and ``distortion_coefficients``."""
+"""Intrinsic parameters of a camera, in the file that the tools of ROS and OpenCV write.
+
+The file (camera_info) has the keys ``camera_matrix`` and ``distortion_coefficients``.
+"""
 
 from __future__ import annotations
 
@@ -41,15 +43,15 @@ def read_camera(path: str | Path) -> Camera:
     matrix = _read_numbers(document, "camera_matrix", path)
     distortion = _read_numbers(document, "distortion_coefficients", path)
     if matrix.size != 9:
-        found = f"{matrix.size} numbers"
-        raise InputError(path, "camera_matrix", found, "9 numbers, row by row")
+        count = f"{matrix.size} numbers"
+        raise InputError(path, "camera_matrix", count, "9 numbers, row by row")
     matrix = matrix.reshape(3, 3)
     if not (matrix[0, 0] > 0.0 and matrix[1, 1] > 0.0 and matrix[2, 2] == 1.0):
-        found = (
+        entries = (
             f"fx {matrix[0, 0]:g}, fy {matrix[1, 1]:g}, last number {matrix[2, 2]:g}"
         )
         allowed = "positive focal lengths in pixels, and 1 as the last number"
-        raise InputError(path, "camera_matrix", found, allowed)
+        raise InputError(path, "camera_matrix", entries, allowed)
     size = None
     if "image_width" in document and "image_height" in document:
         size = (int(document["image_width"]), int(document["image_height"]))

@@ -1,7 +1,7 @@
 """Poses of a board that a script with OpenCV saved by ``numpy.savez``.
 
-``rvecs`` and ``tvecs`` are what ``cv2.calibrateCamera`` and ``cv2.solvePnP`` return, and
-many scripts keep joint angles beside them. A file with a pickled object is refused.
+``cv2.calibrateCamera`` and ``cv2.solvePnP`` return the arrays ``rvecs`` and ``tvecs``.
+Many scripts save joint angles in the same file. A file with a pickled object is refused.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ _ALLOWED = "arrays rvecs and tvecs, as cv2.calibrateCamera returns them"
 def read_opencv_poses(path: str | Path) -> BoardPoses:
     """Read poses of the board, and joint angles if there are any.
 
-    Raises `InputError`: the file is no such archive, lacks an array, or has one of
-    another size or one that is pickled.
+    Raises `InputError`: the file is not an archive of NumPy, an array is missing or has
+    the wrong size, or an array is pickled.
     """
     try:
-        # Loading a pickle runs what it says, so that objects are refused.
+        # Loading a pickle runs code from the file; refuse pickled objects.
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
     except (OSError, ValueError, zipfile.BadZipFile, AttributeError) as error:
@@ -42,27 +42,26 @@ def read_opencv_poses(path: str | Path) -> BoardPoses:
     elif rotation.size == 3 * count:
         matrices = Rotation.from_rotvec(rotation.reshape(-1, 3)).as_matrix()
     else:
-        found = f"{rotation.size} numbers of rotations for {count} positions"
-        raise InputError(path, _ROTATIONS[0], found, "3 or 9 for each position")
+        counts = f"{rotation.size} numbers of rotations for {count} positions"
+        raise InputError(path, _ROTATIONS[0], counts, "3 or 9 for each position")
     angles = None
     if any(name in arrays for name in _ANGLES):
         angles = _find_array(arrays, _ANGLES, path)
         if angles.ndim != 2 or len(angles) != count:
-            found = f"an array {angles.shape} of joint angles"
-            raise InputError(
-                path, "", found, f"{count} rows, one for each pose, in rad"
-            )
+            shape = f"an array {angles.shape} of joint angles"
+            allowed = f"{count} rows, one for each pose, in rad"
+            raise InputError(path, "", shape, allowed)
     return BoardPoses(Path(path).as_posix(), position, matrices, angles)
 
 
 def _find_array(
     arrays: dict[str, np.ndarray], names: tuple[str, ...], path: str | Path
 ) -> np.ndarray:
-    """Find the first array of these names, as numbers."""
+    """Return the array with the first of these names that the file has, as floats."""
     name = next((name for name in names if name in arrays), None)
     if name is None:
-        found = f"arrays {', '.join(arrays) or 'none'}"
-        raise InputError(path, "", found, f"{_ALLOWED}; no {' or '.join(names)}")
+        available = f"arrays {', '.join(arrays) or 'none'}"
+        raise InputError(path, "", available, f"{_ALLOWED}; no {' or '.join(names)}")
     try:
         return np.asarray(arrays[name], float)
     except (TypeError, ValueError):

@@ -1,8 +1,8 @@
 """Calibration data of robot_calibration, exported from its bag as CSV [1]_.
 
-A message has the joint states and, of each sensor, the corners of a board. The camera's
-corners are in its own frame, the arm's in that of the board; the pose of the board is the
-rigid motion between them [2]_.
+A message contains the joint states and the corners of a board from each sensor. The
+sensor of the camera states the corners in the camera's frame, the sensor of the arm in
+the frame of the board. The pose of the board is the rigid motion between the two [2]_.
 
 References
 ----------
@@ -27,7 +27,7 @@ _JOINT = re.compile(r"field\.joint_states\.(name|position)(\d+)")
 _POINT = re.compile(r"field\.observations(\d+)\.features(\d+)\.point\.([xyz])")
 _SENSOR = "field.observations{}.sensor_name"
 _ALLOWED = "rostopic echo -b calibration_data.bag -p /calibration_data > data.csv"
-# Corners that determine a pose.
+# Smallest number of corners that determines a pose.
 _FEWEST_POINTS = 3
 
 
@@ -69,8 +69,8 @@ def read_robot_calibration(
         if missing:
             raise InputError(path, key, f"no joint {missing[0]}", ", ".join(states))
         angles.append([states[name] for name in names])
-        seen, board = _read_corners(message, camera_sensor, path, key)
-        rotation, position = _fit_rigid_motion(board, seen)
+        in_camera, on_board = _read_corners(message, camera_sensor, path, key)
+        rotation, position = _fit_rigid_motion(on_board, in_camera)
         rotations.append(rotation)
         positions.append(position)
     return BoardPoses(
@@ -86,15 +86,15 @@ def _read_joints(
     message: Mapping[str, str], path: str | Path, key: str
 ) -> dict[str, float]:
     """Read the angles of all joints by their names, rad."""
-    parts: dict[str, dict[str, str]] = {"name": {}, "position": {}}
+    fields: dict[str, dict[str, str]] = {"name": {}, "position": {}}
     for column, text in message.items():
         match = _JOINT.fullmatch(column or "")
         if match and text:
-            parts[match[1]][match[2]] = text
+            fields[match[1]][match[2]] = text
     try:
         return {
-            name: float(parts["position"][index])
-            for index, name in parts["name"].items()
+            name: float(fields["position"][index])
+            for index, name in fields["name"].items()
         }
     except (KeyError, ValueError):
         raise InputError(path, key, "no joint states", _ALLOWED) from None
@@ -103,8 +103,31 @@ def _read_joints(
 def _read_corners(
     message: Mapping[str, str], camera_sensor: str, path: str | Path, key: str
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Read the corners as the camera has them and in the frame of the board, (M, 3)."""
-    corners: dict[str, dict[tuple[int, str], float]] = {}
+    """Read the corners in the frame of the camera and in that of the board, (M, 3), m."""
+    corners = _read_corners_of_sensors(message, path, key)
+    arm_sensors = [sensor for sensor in corners if sensor != camera_sensor]
+    if camera_sensor not in corners or not arm_sensors:
+        sensors = f"corners of {', '.join(corners) or 'no sensor'}"
+        allowed = (
+            f"{camera_sensor} (--sensor NAME) and one with the board's own corners"
+        )
+        raise InputError(path, key, sensors, allowed)
+    in_camera = corners[camera_sensor]
+    on_board = corners[arm_sensors[0]]
+    if len(in_camera) != len(on_board) or len(in_camera) < _FEWEST_POINTS:
+        counts = (
+            f"{len(in_camera)} corners of {camera_sensor},"
+            f" {len(on_board)} of {arm_sensors[0]}"
+        )
+        raise InputError(path, key, counts, "the same number of at least 3")
+    return in_camera, on_board
+
+
+def _read_corners_of_sensors(
+    message: Mapping[str, str], path: str | Path, key: str
+) -> dict[str, np.ndarray]:
+    """Read the corners (M, 3) of each sensor, by its name."""
+    coordinates: dict[str, dict[tuple[int, str], float]] = {}
     for column, text in message.items():
         match = _POINT.fullmatch(column or "")
         if match and text:
@@ -112,35 +135,24 @@ def _read_corners(
             try:
                 number = float(text)
             except ValueError:
-                raise InputError(
-                    path, key, f"{text!r} in {column}", "a number"
-                ) from None
-            corners.setdefault(sensor, {})[int(match[2]), match[3]] = number
-    others = [sensor for sensor in corners if sensor != camera_sensor]
-    if camera_sensor not in corners or not others:
-        found = f"corners of {', '.join(corners) or 'no sensor'}"
-        allowed = (
-            f"{camera_sensor} (--sensor NAME) and one with the board's own corners"
-        )
-        raise InputError(path, key, found, allowed)
-    points = []
-    for sensor in (camera_sensor, others[0]):
-        numbers = [corners[sensor][index] for index in sorted(corners[sensor])]
-        points.append(np.array(numbers[: 3 * (len(numbers) // 3)]).reshape(-1, 3))
-    seen, board = points
-    if len(seen) != len(board) or len(seen) < _FEWEST_POINTS:
-        found = f"{len(seen)} corners of {camera_sensor}, {len(board)} of {others[0]}"
-        raise InputError(path, key, found, "the same number of at least 3")
-    return seen, board
+                problem = f"{text!r} in {column}"
+                raise InputError(path, key, problem, "a number") from None
+            coordinates.setdefault(sensor, {})[int(match[2]), match[3]] = number
+    corners = {}
+    for sensor, by_axis in coordinates.items():
+        numbers = [by_axis[index] for index in sorted(by_axis)]
+        corners[sensor] = np.array(numbers[: 3 * (len(numbers) // 3)]).reshape(-1, 3)
+    return corners
 
 
 def _fit_rigid_motion(
     points: np.ndarray, moved: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Fit rotation (3, 3) and translation (3,) that move M points onto others."""
+    """Fit the rotation (3, 3) and translation (3,), m, that move points (M, 3) to `moved`."""
     centre = points.mean(axis=0)
     moved_centre = moved.mean(axis=0)
-    left, _, right = np.linalg.svd((moved - moved_centre).T @ (points - centre))
-    sign = np.sign(np.linalg.det(left @ right))
-    rotation = left @ np.diag([1.0, 1.0, sign]) @ right
+    covariance = (moved - moved_centre).T @ (points - centre)
+    left_vectors, _, right_vectors = np.linalg.svd(covariance)
+    sign = np.sign(np.linalg.det(left_vectors @ right_vectors))
+    rotation = left_vectors @ np.diag([1.0, 1.0, sign]) @ right_vectors
     return rotation, moved_centre - rotation @ centre

@@ -1,4 +1,4 @@
-"""A board to print: to scale, with a line that shows whether the printer kept the scale."""
+"""A board to print, to scale, with a line that shows if the printer changed the scale."""
 
 from __future__ import annotations
 
@@ -21,18 +21,19 @@ _MM_PER_INCH = 25.4
 _MARGIN_MM = 6.0
 # Space under the board for the line and its text, mm.
 _FOOT_MM = 17.0
-# Length of the line that a rule is laid on, mm.
+# Length of the line that the user checks with a rule, mm.
 RULER_MM = 100.0
 _TICK_MM = 10.0
 
 
 def draw_board(pattern: BoardPattern, paper: str) -> Figure:
-    """Draw a board on a sheet of paper, one millimetre of it on one of the sheet.
+    """Draw a board to scale on a sheet of paper.
 
     Parameters
     ----------
     pattern : the board.
-    paper : a key of `PAPERS_MM`; turned where the board is wider than high.
+    paper : a key of `PAPERS_MM`; the sheet is in landscape if the board is wider than
+        high.
 
     Raises
     ------
@@ -46,9 +47,9 @@ def draw_board(pattern: BoardPattern, paper: str) -> Figure:
     sheet = sorted(PAPERS_MM[paper], reverse=width > height)
     space = (sheet[0] - 2 * _MARGIN_MM, sheet[1] - 2 * _MARGIN_MM - _FOOT_MM)
     if width > space[0] or height > space[1]:
-        found = f"{width:g} x {height:g} mm"
+        size = f"{width:g} x {height:g} mm"
         allowed = f"at most {space[0]:g} x {space[1]:g} mm on {paper}; fewer or smaller"
-        raise InputError("board", "size", found, allowed)
+        raise InputError("board", "size", size, allowed)
     figure = Figure(figsize=(sheet[0] / _MM_PER_INCH, sheet[1] / _MM_PER_INCH))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_xlim(0.0, sheet[0])

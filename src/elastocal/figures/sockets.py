@@ -44,17 +44,13 @@ def draw_sockets(residuals: Columns, heldout: HeldOut) -> Figure:
     _draw_tool(sketch)
     rows = residuals["held_out"] & ~residuals["gross_error"]
     poses = int(rows.sum())
-    points_m = {
-        stage: np.column_stack([residuals[f"{stage}_{axis}"][rows] for axis in _AXES])
-        for stage in ("before", "after")
-    }
-    limit = MILLI * np.abs(points_m["before"]).max()
+    limit = np.abs(_get_points_mm(residuals, "before", rows)).max()
     for axis, stage, rms_m in (
         (before, "before", heldout.before.rms_m),
         (after, "after", heldout.after.rms_m),
     ):
         colour = STAGES[stage][1]
-        points = MILLI * points_m[stage]
+        points = _get_points_mm(residuals, stage, rows)
         _draw_points(axis, points, colour, 1.05 * limit)
         axis.set_title(f"{stage}: {MILLI * rms_m:.3g} mm RMS")
         axis.set_xlabel(f"x in mm, {poses} held-out poses")
@@ -63,6 +59,12 @@ def draw_sockets(residuals: Columns, heldout: HeldOut) -> Figure:
     _draw_points(inset, points, colour, _ENLARGED_MM)
     inset.tick_params(labelsize=5)
     return figure
+
+
+def _get_points_mm(residuals: Columns, stage: str, rows: np.ndarray) -> np.ndarray:
+    """Return the residuals of some rows (N, 2), mm, in the drawn components."""
+    components = [residuals[f"{stage}_{axis}"][rows] for axis in _AXES]
+    return np.asarray(MILLI * np.column_stack(components))
 
 
 def _draw_points(axis: Axes, points: np.ndarray, colour: str, limit: float) -> None:
@@ -78,9 +80,9 @@ def _draw_points(axis: Axes, points: np.ndarray, colour: str, limit: float) -> N
 def _draw_tool(axis: Axes) -> None:
     """Draw the plate with two sockets and the ball on the flange."""
     width = _DISTANCE_MM + 4 * _BALL_MM
-    left = -width / 2
+    left_edge = -width / 2
     axis.add_patch(
-        Rectangle((left, -_PLATE_MM), width, _PLATE_MM, color=_GREY, linewidth=0)
+        Rectangle((left_edge, -_PLATE_MM), width, _PLATE_MM, color=_GREY, linewidth=0)
     )
     for x in (-_DISTANCE_MM / 2, _DISTANCE_MM / 2):
         axis.add_patch(Wedge((x, 0.0), _BALL_MM, 180, 360, color="white", linewidth=0))
@@ -100,7 +102,7 @@ def _draw_tool(axis: Axes) -> None:
     axis.text(x - 11.0, 46.0, "flange", ha="right", va="center")
     axis.text(x - 6.0, 22.0, "ball", ha="right", va="center")
     axis.text(-x, 12.0, "socket", ha="center")
-    axis.set_xlim(left - 4, width / 2 + 4)
+    axis.set_xlim(left_edge - 4, width / 2 + 4)
     axis.set_ylim(-_PLATE_MM - 22, 60)
     axis.set_aspect("equal")
     axis.set_axis_off()

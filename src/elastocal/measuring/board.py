@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 # Values of ``camera`` of campaign.yaml.
 ON_ROBOT = "on_robot"
 BESIDE_ROBOT = "beside_robot"
-# Cosine of the obliquity below which no corner of a board is found.
+# Lower bound on the cosine of the obliquity; no corners are detected on a board that is
+# seen more obliquely.
 _GRAZING = 0.2
 
 
@@ -45,32 +46,33 @@ class Board(Pose):
     def shape_noise(
         self, position: np.ndarray, rotation: np.ndarray, options: Mapping[str, Any]
     ) -> NoiseShape | None:
-        """Describe the noise of a pinhole camera that sees corners with equal errors.
+        """Describe the noise of a pinhole camera that locates all corners equally well.
 
-        A corner is off by an angle of the view. Across the optical axis the board is
-        then off in proportion to the range, and along it by the square of the range,
-        because depth follows from the size of the board in the image. Turns grow with
-        the range. Those about axes in the board also grow with the obliquity, which
-        narrows the board in the image; that about its normal is the most certain one.
+        The error of a corner is an angle of view. Errors of position across the optical
+        axis are therefore proportional to the range. Those along the axis grow with the
+        square of the range, because depth follows from the size of the board in the
+        image. Errors of rotation grow with the range. Rotations about axes in the board
+        also become less certain with obliquity, because an oblique board is narrower in
+        the image. The rotation about the normal is the most certain one.
         """
-        is_on_robot = options.get("camera", ON_ROBOT) == ON_ROBOT
-        seen, turned = self.convert(position, rotation, options)
-        range_m = np.linalg.norm(seen, axis=1)
-        share = (range_m / np.median(range_m))[:, None]
-        facing = np.abs((turned[:, :, 2] * seen).sum(axis=1)) / range_m
-        narrowed = share / np.maximum(facing, _GRAZING)[:, None]
-        sizes = np.hstack([share, share, share**2, narrowed, narrowed, share])
-        in_camera = np.zeros((len(seen), 6, 6))
-        in_camera[:, :3, :3] = np.eye(3)
-        in_camera[:, 3:, 3:] = turned
-        axes = in_camera
-        if is_on_robot:
-            # The pose of the camera on the board is the inverse of what is seen.
-            moved = np.zeros((len(seen), 6, 6))
-            moved[:, :3, :3] = -rotation
-            moved[:, 3:, 3:] = -rotation
-            moved[:, :3, 3:] = -rotation @ _cross_matrices(seen)
-            axes = moved @ in_camera
+        board_position, board_rotation = self.convert(position, rotation, options)
+        range_m = np.linalg.norm(board_position, axis=1)
+        ratio = (range_m / np.median(range_m))[:, None]
+        normal = board_rotation[:, :, 2]
+        cosine = np.abs((normal * board_position).sum(axis=1)) / range_m
+        tilting = ratio / np.maximum(cosine, _GRAZING)[:, None]
+        sizes = np.hstack([ratio, ratio, ratio**2, tilting, tilting, ratio])
+        axes = np.zeros((len(board_position), 6, 6))
+        axes[:, :3, :3] = np.eye(3)
+        axes[:, 3:, 3:] = board_rotation
+        if options.get("camera", ON_ROBOT) == ON_ROBOT:
+            # The measured pose is that of the camera on the board: the inverse of the
+            # pose of the board in the camera.
+            inversion = np.zeros((len(board_position), 6, 6))
+            inversion[:, :3, :3] = -rotation
+            inversion[:, 3:, 3:] = -rotation
+            inversion[:, :3, 3:] = -rotation @ _cross_matrices(board_position)
+            axes = inversion @ axes
         return NoiseShape(axes, sizes, np.array([0, 0, 1, 2, 2, 3]))
 
 

@@ -1,13 +1,14 @@
-"""What a campaign measures: its kinds, its features, and the channels that its rows are.
+"""Kinds, features and channels of the measurements of a campaign.
 
-A channel is a kind of measurement of one feature. If all kinds of a campaign have equally
-many numbers, a row is one measurement of so many numbers. Otherwise each number of a row
-is a measurement of its own, with a channel for each component.
+A channel is a kind of measurement of one feature. If all kinds of a campaign have the
+same number of components, a row is one measurement with these components. Otherwise each
+component is a measurement of its own, with its own channel.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
 _KEY = "features"
-# Places that the distances between them put into one frame.
+_DISTANCES = "distances"
+# Upper bound on the places that are located by the distances between them.
 _MOST_PLACES_BY_DISTANCES = 3
 
 
@@ -41,7 +43,7 @@ class Channel:
 
     @property
     def is_angle(self) -> bool:
-        """Whether the numbers are of rotations alone, rad."""
+        """Whether the measurement is one component of a rotation, rad."""
         return self.component is not None and self.component >= 3
 
 
@@ -52,11 +54,12 @@ class MeasuringPlan:
     Attributes
     ----------
     kinds : kinds of its rows.
-    features : what is touched, or against which is measured.
+    features : objects that are touched, or against which the target is measured.
     channels : channels of its measurements; empty if every row is the pose or position
         of a target, which needs neither features nor components.
     rows : numbers in one measurement.
-    camera : where the camera of boards is; empty if not stated.
+    camera : mounting of the camera that sees a board, as `measuring.board` names it;
+        empty if not stated.
     """
 
     kinds: tuple[Kind, ...]
@@ -107,14 +110,14 @@ def parse_measuring(document: Mapping[str, Any], source: str) -> MeasuringPlan:
     InputError
         A kind is unknown, or a feature is not as its kind needs it.
     """
-    known = list_kinds()
+    available = list_kinds()
     measured = document["measured"]
     names = [measured] if isinstance(measured, str) else list(measured)
     for name in names:
-        if name not in known:
-            allowed = suggest_names(name, list(known))
+        if name not in available:
+            allowed = suggest_names(name, list(available))
             raise InputError(source, "measured", repr(name), allowed)
-    kinds = tuple(known[name] for name in dict.fromkeys(names))
+    kinds = tuple(available[name] for name in dict.fromkeys(names))
     features = _parse_features(document, kinds, source)
     numbers = {kind.numbers for kind in kinds}
     rows = numbers.pop() if len(numbers) == 1 else 1
@@ -183,54 +186,60 @@ def _place_by_distances(
 ) -> list[Feature]:
     """Turn stated distances between two or three places into coordinates with standard
     deviations, in a frame with the first place at its origin."""
-    distances = document.get("distances", [])
+    distances = document.get(_DISTANCES, [])
     if not distances:
         return features
-    key = "distances"
     if document["frame"] == "base":
         allowed = "frame: unknown, because distances say nothing of the base"
-        raise InputError(source, key, "frame: base", allowed)
+        raise InputError(source, _DISTANCES, "frame: base", allowed)
     names = [feature.name for feature in features if feature.kind == "point"]
+    stated = _read_distances(distances, names, source)
+    linked = set().union(*stated)
+    names = [name for name in names if name in linked]
+    pairs = [frozenset(pair) for pair in combinations(names, 2)]
+    is_complete = all(pair in stated for pair in pairs)
+    if len(names) > _MOST_PLACES_BY_DISTANCES or not is_complete:
+        counts = f"{len(stated)} distances of {len(names)} places"
+        allowed = "one of two places, or all three of three; otherwise state position_m"
+        raise InputError(source, _DISTANCES, counts, allowed)
+    coordinates, deviations = _trilaterate(*np.array([stated[p] for p in pairs]).T)
+    if not np.isfinite(coordinates).all():
+        problem = "three distances that no triangle has"
+        raise InputError(source, _DISTANCES, problem, "distances of a triangle")
+    placed = list(features)
+    for index, feature in enumerate(features):
+        if feature.name in names:
+            corner = names.index(feature.name)
+            placed[index] = _state_place(
+                feature, coordinates[corner], deviations[corner]
+            )
+    return placed
+
+
+def _read_distances(
+    distances: Sequence[Mapping[str, Any]], places: Sequence[str], source: str
+) -> dict[frozenset[str], tuple[float, float]]:
+    """Read distances and their standard deviations, m, by the two places between which
+    they were measured."""
     stated = {}
     for index, entry in enumerate(distances):
         for name in entry["between"]:
-            if name not in names:
-                where = f"{key}[{index}].between"
-                raise InputError(source, where, repr(name), suggest_names(name, names))
+            if name not in places:
+                where = f"{_DISTANCES}[{index}].between"
+                allowed = suggest_names(name, places)
+                raise InputError(source, where, repr(name), allowed)
         stated[frozenset(entry["between"])] = (entry["distance_m"], entry["std_m"])
-    joined = [name for name in names if any(name in pair for pair in stated)]
-    pairs = [
-        frozenset((first, second))
-        for number, second in enumerate(joined)
-        for first in joined[:number]
-    ]
-    if len(joined) > _MOST_PLACES_BY_DISTANCES or any(p not in stated for p in pairs):
-        found = f"{len(stated)} distances of {len(joined)} places"
-        allowed = "one of two places, or all three of three; otherwise state position_m"
-        raise InputError(source, key, found, allowed)
-    coordinates, deviations = _trilaterate(*np.array([stated[p] for p in pairs]).T)
-    if not np.isfinite(coordinates).all():
-        allowed = "distances of a triangle"
-        raise InputError(source, key, "three distances that no triangle has", allowed)
-    placed = {
-        name: _state_place(name, features, coordinates[number], deviations[number])
-        for number, name in enumerate(joined)
-    }
-    return [placed.get(feature.name, feature) for feature in features]
+    return stated
 
 
 def _state_place(
-    name: str,
-    features: Sequence[Feature],
-    position_m: np.ndarray,
-    std_m: np.ndarray,
+    feature: Feature, position_m: np.ndarray, std_m: np.ndarray
 ) -> Feature:
     """State a place (3,) and its standard deviations (3,) in a feature without one."""
-    feature = next(feature for feature in features if feature.name == name)
     if "position_m" in feature.stated:
-        where = f"{_KEY}.{name}.position_m"
-        found = "beside distances of this place"
-        raise InputError(feature.source, where, found, "one of them")
+        where = f"{_KEY}.{feature.name}.position_m"
+        problem = "beside distances of this place"
+        raise InputError(feature.source, where, problem, "one of them")
     keys = {"position_m": position_m.tolist(), "std_m": std_m.tolist()}
     return replace(feature, stated={**feature.stated, **keys})
 
