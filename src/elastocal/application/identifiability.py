@@ -1,8 +1,8 @@
-"""Errors of a robot that a set-up without a tracker cannot see, and the rows that would.
+"""Robot errors that a set-up without a tracker cannot show, and rows that would show them.
 
-A frame, a tool or a feature that is fitted follows some errors of the robot exactly. An
-error that they follow leaves no residual, whatever its size: it is in the null space of
-the design. Each error is tested by itself, at the size of a usual tolerance.
+Fitted frames, tools and features can compensate some errors of the robot exactly. Such an
+error leaves no residual, whatever its size: it is in the null space of the design. Each
+error is tested separately, at the size of a usual tolerance.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from elastocal.fitting.sensor_noise import compute_sensor_roots
 from elastocal.measuring.protocol import span_plane
 
 if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.observations import Observations
@@ -35,10 +36,10 @@ if TYPE_CHECKING:
 # Sizes of the errors that are tested: a millimetre, a milliradian, and a thousandth of
 # all lengths.
 _SIZE = 1e-3
-# An error of this size is seen if it is so many standard errors, which a test at 1 %
-# finds with a probability of two thirds.
+# Smallest size of a visible error in standard errors. A test at the 1 % level detects
+# it with a probability of two thirds.
 _SEEN = 3.0
-# Columns that are this small against the others after projection are rounding.
+# Singular values below this share of the largest are rounding errors.
 _RANK_ROUNDING = 1e-9
 _MOST_NAMED = 6
 # Distance of two sockets, m, that a gauge or a printed tool has.
@@ -66,30 +67,35 @@ class Unseen:
 
 @dataclass(frozen=True)
 class _Rows:
-    """Rows of R numbers, whitened: columns of what is fitted beside the robot, and of
-    the errors of the robot by name."""
+    """Whitened design of R numbers.
+
+    Attributes
+    ----------
+    fitted : (R, F) array, columns of the fitted frames, targets and features.
+    errors : (R,) arrays, column of each error of the robot, by its name.
+    """
 
     fitted: np.ndarray
     errors: Mapping[str, np.ndarray]
 
     def count_std_errors(self) -> dict[str, float]:
-        """Size of each error in standard errors, after what is fitted has followed."""
-        left, values, _ = np.linalg.svd(self.fitted, full_matrices=False)
-        basis = left[:, values > _RANK_ROUNDING * values.max(initial=1.0)]
+        """Size of each error in standard errors, less what the fitted columns explain."""
+        vectors, values, _ = np.linalg.svd(self.fitted, full_matrices=False)
+        basis = vectors[:, values > _RANK_ROUNDING * values.max(initial=1.0)]
         sizes = {}
         for name, column in self.errors.items():
             remaining = column - basis @ (basis.T @ column)
             sizes[name] = float(np.linalg.norm(remaining))
         return sizes
 
-    def join(self, other: _Rows) -> _Rows:
-        """Join other rows, which have further fitted columns of their own."""
-        own = self.fitted.shape[1]
-        fitted = np.zeros((len(self.fitted) + len(other.fitted), other.fitted.shape[1]))
-        fitted[: len(self.fitted), :own] = self.fitted
-        fitted[len(self.fitted) :] = other.fitted
+    def append(self, further: _Rows) -> _Rows:
+        """Append further rows, whose fitted columns begin with those of these rows."""
+        count, width = self.fitted.shape
+        fitted = np.zeros((count + len(further.fitted), further.fitted.shape[1]))
+        fitted[:count, :width] = self.fitted
+        fitted[count:] = further.fitted
         errors = {
-            name: np.concatenate([column, other.errors[name]])
+            name: np.concatenate([column, further.errors[name]])
             for name, column in self.errors.items()
         }
         return _Rows(fitted, errors)
@@ -109,20 +115,24 @@ def find_unseen_errors(fitted: Fit, observations: Observations) -> list[Unseen]:
     unseen = [name for name, size in rows.count_std_errors().items() if size < _SEEN]
     if not unseen:
         return []
-    further = _list_further_rows(model, estimate, observations, fitted)
-    found = {
-        remedy: rows.join(_pad_fitted(extra, rows)).count_std_errors()
-        for remedy, extra in further.items()
+    remedies = _list_further_rows(model, estimate, observations, fitted)
+    sizes_with = {
+        remedy: rows.append(_pad_fitted(further, rows)).count_std_errors()
+        for remedy, further in remedies.items()
     }
-    return [Unseen(name, _find_remedy(name, found)) for name in unseen]
+    return [Unseen(name, _find_remedy(name, sizes_with)) for name in unseen]
 
 
-def _find_remedy(name: str, found: Mapping[str, Mapping[str, float]]) -> str:
-    """Find the first further rows that show an error, by what each of them makes of it;
-    empty if none does. Only a distance shows a scale without the base."""
-    for remedy, sizes in found.items():
-        is_of_scale = (remedy == _PAIR) == (name == _SCALE) or remedy == _KNOWN
-        if is_of_scale and sizes[name] >= _SEEN:
+def _find_remedy(name: str, sizes_with: Mapping[str, Mapping[str, float]]) -> str:
+    """Find the first remedy that shows an error; empty if none does.
+
+    `sizes_with` are the sizes of all errors in standard errors, by remedy. Only places
+    that are known in the base, and distances between places, show a scale; distances are
+    no remedy for any other error.
+    """
+    for remedy, sizes in sizes_with.items():
+        is_suitable = (remedy == _PAIR) == (name == _SCALE) or remedy == _KNOWN
+        if is_suitable and sizes[name] >= _SEEN:
             return remedy
     return ""
 
@@ -135,8 +145,8 @@ def describe_unseen_errors(unseen: list[Unseen]) -> list[str]:
     sentences = []
     for remedy, names in by_remedy.items():
         if set(_BASE_ERRORS) <= set(names):
-            others = [name for name in names if name not in _BASE_ERRORS]
-            names = ["where the base stands and how it is turned", *others]
+            in_robot = [name for name in names if name not in _BASE_ERRORS]
+            names = ["where the base stands and how it is turned", *in_robot]
         listed = list_first(names, _MOST_NAMED)
         cure = f"{remedy} would show it"
         if not remedy:
@@ -148,10 +158,10 @@ def describe_unseen_errors(unseen: list[Unseen]) -> list[str]:
 def predict_tip_error(fitted: Fit, observations: Observations) -> float | None:
     """Predict the RMS error of the target's position, m, that the fit leaves.
 
-    It comes from the parameter covariance of the robot at the fitted poses, after the
-    best placement of base and tool, which no row of features determines. A parameter
-    that is not identified has its plausible size, or its prior. None if the model has no
-    parameter of the robot.
+    The error follows from the covariance of the robot's parameters at the fitted poses,
+    after the best placement of base and tool, which no row of features determines. For a
+    parameter that is not identified, its prior or its plausible size replaces the
+    standard error. None if the model has no parameter of the robot.
     """
     model = replace(fitted.model, measuring=None, shaped_noise=None, rows=3)
     estimate = replace(fitted.estimate, features=())
@@ -183,7 +193,7 @@ def _complete_covariance(fitted: Fit) -> np.ndarray:
 
 
 def _as_positions(observations: Observations) -> Observations:
-    """The same observations as if positions had been measured."""
+    """Return the observations as if positions had been measured."""
     return replace(
         observations,
         position=np.zeros((len(observations), 3)),
@@ -225,20 +235,18 @@ def _move_robot(
 def _whiten_rows(
     model: Model, estimate: Estimate, observations: Observations, fitted: Fit
 ) -> _Rows:
-    """Rows of the campaign, with the priors of what is fitted beside the robot."""
+    """Whiten the rows of the campaign, and append those of the priors of the parameters.
+
+    Model and estimate have no effects, so the parameters are those of frames, targets
+    and features.
+    """
     conditions = evaluate_conditions(model, estimate, observations.states)
     linear = linearize(model, estimate, observations, conditions)
     roots = compute_sensor_roots(model, estimate, observations, fitted.noise)
     whitening = compute_whitening(
         observations, linear.joint_jacobian, fitted.noise.without_pose_error, roots
     )
-    by_pose = np.tile(np.eye(observations.rows, 6), (len(observations), 1, 1))
-    if model.measuring is not None:
-        poses = predict(model, estimate, observations, conditions)
-        placed = place_in_session(estimate, observations, *poses)
-        by_pose = evaluate_channels(
-            model.measuring, observations, placed, estimate.features
-        ).by_pose
+    by_pose = _differentiate_by_pose(model, estimate, observations, conditions)
     columns = whitening.apply(linear.sensitivities)
     parameters = [parameter for _, parameter in list_parameters(model, estimate)]
     priors = np.diag([1.0 / p.prior_std if p.prior_std else 0.0 for p in parameters])
@@ -251,18 +259,31 @@ def _whiten_rows(
     return _Rows(np.vstack([columns.reshape(-1, width), priors]), errors)
 
 
-def _pad_fitted(extra: _Rows, rows: _Rows) -> _Rows:
-    """Put columns of unknowns of further rows behind those that the rows have."""
-    missing = rows.fitted.shape[1] - extra.fitted.shape[1]
+def _differentiate_by_pose(
+    model: Model, estimate: Estimate, observations: Observations, conditions: Conditions
+) -> np.ndarray:
+    """Derivative (M, r, 6) of M measurements in the poses of their targets, base axes."""
+    if model.measuring is None:
+        return np.tile(np.eye(observations.rows, 6), (len(observations), 1, 1))
+    poses = predict(model, estimate, observations, conditions)
+    placed = place_in_session(estimate, observations, *poses)
+    return evaluate_channels(
+        model.measuring, observations, placed, estimate.features
+    ).by_pose
+
+
+def _pad_fitted(further: _Rows, rows: _Rows) -> _Rows:
+    """Append columns of zeros if the further rows have fewer fitted columns."""
+    missing = rows.fitted.shape[1] - further.fitted.shape[1]
     if missing <= 0:
-        return extra
-    return replace(extra, fitted=np.pad(extra.fitted, ((0, 0), (0, missing))))
+        return further
+    return replace(further, fitted=np.pad(further.fitted, ((0, 0), (0, missing))))
 
 
 def _list_further_rows(
     model: Model, estimate: Estimate, observations: Observations, fitted: Fit
 ) -> dict[str, _Rows]:
-    """Further rows, by what a user would add, cheapest first."""
+    """List further rows that a user could measure, by their description, cheapest first."""
     plain = _as_positions(observations)
     positions = replace(model, measuring=None, shaped_noise=None, rows=3)
     bare = replace(estimate, features=())
@@ -288,7 +309,7 @@ def _list_further_rows(
 
 @dataclass(frozen=True)
 class _FurtherRows:
-    """What further rows share with those of a campaign.
+    """Makes rows at the poses of a campaign, measured in another way.
 
     Attributes
     ----------
@@ -306,7 +327,7 @@ class _FurtherRows:
     noise_m: float
 
     def in_pair(self) -> _Rows:
-        """Rows in two sockets, which are anywhere; only their distance is known."""
+        """Make rows in two sockets at unknown places, a known distance apart."""
         count = len(self.position)
         places = _PAIR_M * np.eye(3)[np.arange(count) % 2]
         shifts = np.tile(np.eye(3), (count, 1, 1))
@@ -316,20 +337,21 @@ class _FurtherRows:
         return scaled._make(np.eye(3), unknowns)
 
     def on_plane(self, normal: np.ndarray) -> _Rows:
-        """Rows on a plane with a normal (3,) that is known only roughly."""
+        """Make rows on a plane with a roughly known normal (3,)."""
         tilts = self.position @ span_plane(normal).T
         unknowns = np.column_stack([tilts, np.ones(len(tilts))])[:, None]
         return self._make(normal[None], unknowns)
 
     def at_known_places(self) -> _Rows:
-        """Rows at places that are known in the base frame."""
+        """Make rows at places that are known in the base frame."""
         return self._make(np.eye(3), np.zeros((len(self.position), 3, 0)))
 
     def _make(self, directions: np.ndarray, unknowns: np.ndarray) -> _Rows:
-        """Rows along directions (r, 3), with own unknowns (M, r, k), whitened."""
+        """Make whitened rows along directions (r, 3), with further unknowns (M, r, k)."""
         count = len(self.position) * len(directions)
         along = (directions @ self.shared).reshape(count, -1)
-        # Features of the campaign come between shared and own columns.
+        # The features of the campaign have the columns between the shared and the further
+        # ones.
         between = np.zeros((count, self.features))
         fitted = np.hstack([along, between, unknowns.reshape(count, -1)])
         errors = {

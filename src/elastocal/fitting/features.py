@@ -1,7 +1,7 @@
-"""Features of a campaign in a fit: their parameters, and the measurements of all kinds.
+"""Features of a campaign in a fit: their parameters, and predictions of all kinds.
 
-A kind evaluates its measurements in the frame of the session. Vectors and derivatives are then
-turned to base axes, in which the chain of the robot moves.
+A kind predicts its measurements in the frame of the session. Vectors and derivatives are
+then rotated to base axes, in which the kinematic chain is differentiated.
 """
 
 from __future__ import annotations
@@ -27,8 +27,11 @@ if TYPE_CHECKING:
 class SessionPoses(NamedTuple):
     """Predicted poses of targets in the frames of their sessions.
 
-    `position` (M, 3), m, and `rotation` (M, 3, 3); `frame` (M, 3, 3) turns base axes to
-    those of the session.
+    Attributes
+    ----------
+    position : (M, 3) array, m.
+    rotation : (M, 3, 3) array.
+    frame : (M, 3, 3) array, rotation from base axes to the axes of the session.
     """
 
     position: np.ndarray
@@ -42,10 +45,10 @@ class FittedFeature:
 
     Attributes
     ----------
-    index : int, of the feature in the plan
-    feature, kind
-    numbers : list of int, its fitted unknowns; exact ones are not fitted
-    columns : slice of the fitted unknowns of all features
+    index : index of the feature in the plan
+    feature, kind : the feature and its kind
+    numbers : indices of its fitted unknowns; exact ones are not fitted
+    columns : slice of these unknowns among the fitted unknowns of all features
     """
 
     index: int
@@ -98,7 +101,7 @@ def list_feature_parameters(plan: MeasuringPlan | None) -> list[tuple[str, Param
 def get_feature_deviations(
     plan: MeasuringPlan | None, values: Sequence[np.ndarray]
 ) -> list[np.ndarray]:
-    """Deviations of fitted unknowns from what is declared of them, for each feature."""
+    """Deviations of fitted unknowns from their declared values, one array a feature."""
     return [
         entry.kind.deviate(entry.feature, values[entry.index])[entry.numbers]
         for entry in list_fitted_features(plan)
@@ -108,7 +111,7 @@ def get_feature_deviations(
 def state_features(
     plan: MeasuringPlan | None, values: Sequence[np.ndarray]
 ) -> list[np.ndarray]:
-    """Absolute values of fitted unknowns, for each feature."""
+    """Absolute values of fitted unknowns, one array a feature."""
     return [
         entry.kind.state(values[entry.index])[entry.numbers]
         for entry in list_fitted_features(plan)
@@ -163,7 +166,7 @@ def evaluate_channels(
         members = np.flatnonzero(observations.channel == number)
         predicted = _evaluate_channel(
             channel,
-            SessionPoses(*(values_of[members] for values_of in poses)),
+            SessionPoses(*(array[members] for array in poses)),
             numbers[members],
             np.zeros(0) if channel.feature is None else values[channel.feature],
         )
@@ -201,8 +204,11 @@ def _evaluate_channel(
 
 
 def gather_numbers(observations: Observations, plan: MeasuringPlan) -> np.ndarray:
-    """Gather the numbers (M, 6) of observations as their kinds have them; a component of
-    a vector alone stands in its place."""
+    """Gather the numbers (M, 6) of observations, m and rad, as their kinds expect them.
+
+    If an observation is one component of a vector, its number moves to the column of
+    this component.
+    """
     numbers = np.zeros((len(observations), 6))
     width = observations.position.shape[1]
     numbers[:, :width] = observations.position
