@@ -102,3 +102,14 @@ def count_std_errors(fitted, offsets=OFFSETS_RAD):
         if variance > 0.0:
             deviations.append((value - offset) / np.sqrt(variance))
     return np.array(deviations)
+
+
+def check_recovery(folder, document, rows):
+    """Check that a fit of a campaign recovers the joint offsets and the tool."""
+    fitted = fit_contacts(write_contacts(folder, document, rows))
+    assert fitted.converged
+    # Four offsets are identifiable: 4 standard errors are exceeded in 1 of 4,000 fits.
+    deviations = count_std_errors(fitted)
+    assert len(deviations) == 4
+    assert np.abs(deviations).max() < 4.0
+    np.testing.assert_allclose(fitted.estimate.target_offset[0], TOOL_M, atol=3e-4)

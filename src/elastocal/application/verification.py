@@ -44,7 +44,7 @@ from elastocal.application.frames import (
     select_free_parameters,
 )
 from elastocal.exchange.measured_targets import CorrectedTargets
-from elastocal.fitting.least_squares import align_points
+from elastocal.mechanics.kinematics import align_points
 from elastocal.validation.conformity import MIN_CONFIGURATIONS
 
 if TYPE_CHECKING:

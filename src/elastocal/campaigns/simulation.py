@@ -75,18 +75,29 @@ def draw_measurements(
     force = plan.force_N * np.array(plan.ladder)[load, None] * direction[pose]
     wrench = compute_offset_wrench(force, plan.offset_m)
     position, rotation = _deflected_poses(robot, plan.points, angles, wrench)
-    noise = draws.standard_normal((len(plan.points), 2, len(pose), 3))
-    measured = _add_noise(position, rotation, noise, plan)
-    columns = {"pose": pose, "load": load, "repeat": repeat}
-    columns |= dict(zip(WRENCH_NAMES, wrench.T, strict=True))
+    measured = _add_noise(position, rotation, draws, plan)
+    approaches = {"pose": pose, "load": load, "repeat": repeat}
+    approaches |= dict(zip(WRENCH_NAMES, wrench.T, strict=True))
     for joint, column in enumerate(robot.reported_angles(angles).T, 1):
-        columns[f"q{joint}"] = column
-    # One block of rows for each measuring point.
-    table = {
-        name: np.tile(column, len(plan.points)) for name, column in columns.items()
-    }
+        approaches[f"q{joint}"] = column
+    return _tabulate(approaches, plan.points, measured)
+
+
+def _tabulate(
+    approaches: dict[str, np.ndarray], points: Sequence[str], measured: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Return the columns of a file of measurements, one block of rows for each point.
+
+    Parameters
+    ----------
+    approaches : columns (A,) that all P points have in common.
+    points : names of the points.
+    measured : (P A, 6) array, positions (m) and rotation vectors (rad).
+    """
+    table = {name: np.tile(column, len(points)) for name, column in approaches.items()}
     table |= dict(zip(("x", "y", "z", "rx", "ry", "rz"), measured.T, strict=True))
-    return table | {"target": np.repeat(plan.points, len(pose))}
+    count = len(measured) // len(points)
+    return table | {"target": np.repeat(points, count)}
 
 
 def _draw_angles(robot: Robot, poses: int, draws: np.random.Generator) -> np.ndarray:
@@ -123,17 +134,19 @@ def _deflected_poses(
 
 
 def _add_noise(
-    position: np.ndarray, rotation: np.ndarray, noise: np.ndarray, plan: Plan
+    position: np.ndarray, rotation: np.ndarray, draws: np.random.Generator, plan: Plan
 ) -> np.ndarray:
-    """Return measured positions (m) and rotation vectors (rad), one row for each point
+    """Draw measured positions (m) and rotation vectors (rad), one row for each point
     and approach, (P A, 6).
 
     Parameters
     ----------
-    position, rotation : as of `_deflected_poses`.
-    noise : (P, 2, A, 3) standard normal numbers, of positions and of rotations.
-    plan : with the standard deviations.
+    position, rotation : (P, A, 3) and (P, A, 3, 3) arrays, exact poses.
+    draws : random stream.
+    plan : plan with the standard deviations.
     """
+    points, approaches = position.shape[:2]
+    noise = draws.standard_normal((points, 2, approaches, 3))
     shift, turn = np.moveaxis(noise, 1, 0).reshape(2, -1, 3)
     exact_rotation = Rotation.from_matrix(rotation.reshape(-1, 3, 3))
     measured_rotation = Rotation.from_rotvec(plan.noise_rad * turn) * exact_rotation

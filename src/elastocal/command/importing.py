@@ -42,6 +42,12 @@ _ROBOT_FILE = "robot.yaml"
 # A printed tool is smaller; a larger number is in millimetres.
 _LARGEST_DISTANCE_M = 1.0
 _Force = Annotated[bool, Option("--force", help="Replace an existing file.")]
+_ForceCampaign = Annotated[
+    bool, Option("--force", help="Replace an existing campaign.")
+]
+_RobotFile = Annotated[
+    Path | None, Option(help="Robot file to copy into a folder without one.")
+]
 
 
 @importing.callback()
@@ -295,12 +301,8 @@ def sockets(
     distance: Annotated[
         float, Option(help="Distance between the centres of neighbouring sockets, m.")
     ] = 0.05,
-    robot: Annotated[
-        Path | None, Option(help="Robot file to copy into a folder without one.")
-    ] = None,
-    force: Annotated[
-        bool, Option("--force", help="Replace an existing campaign.")
-    ] = False,
+    robot: _RobotFile = None,
+    force: _ForceCampaign = False,
 ) -> None:
     """Make a campaign of a ball in printed sockets (MUKCa): joint angles alone.
 
@@ -361,12 +363,8 @@ def board(
     sensor: Annotated[
         str, Option(help="Camera among the sensors of robot_calibration.")
     ] = "camera",
-    robot: Annotated[
-        Path | None, Option(help="Robot file to copy into a folder without one.")
-    ] = None,
-    force: Annotated[
-        bool, Option("--force", help="Replace an existing campaign.")
-    ] = False,
+    robot: _RobotFile = None,
+    force: _ForceCampaign = False,
 ) -> None:
     """Make a campaign of poses of a board that a camera saw.
 

@@ -311,42 +311,71 @@ def examine_residuals(
     shared = None
     if spread.all():
         shared = evaluate_conditions(model, estimate, observations.states)
-    residual = np.empty((len(observations), model.rows))
-    for states, rows, block in split_into_blocks(observations, 0):
-        around = _conditions_at(model, estimate, block, shared, states)
-        residual[rows] = compute_residuals(model, estimate, block, around)
+    residual = _compute_in_blocks(model, estimate, observations, shared)
     roots = compute_sensor_roots(model, estimate, observations, noise)
     sensor_distance = np.linalg.norm(
         standardize_residual(residual, noise, roots), axis=1
     )
     limit = np.quantile(sensor_distance[spread], _EXAMINED_QUANTILE)
     examined = spread | in_sample | (sensor_distance > limit)
+    blocks = _linearize_rows(
+        model,
+        estimate,
+        select_states(observations, examined),
+        noise,
+        shared,
+        include_parameters=include_parameters,
+    )
+    return StudentizedResiduals(
+        residual, sensor_distance, in_sample, examined, blocks, noise
+    )
+
+
+def _compute_in_blocks(
+    model: Model,
+    estimate: Estimate,
+    observations: Observations,
+    shared: Conditions | None,
+) -> np.ndarray:
+    """Compute the residuals (N, r) of all observations, some at a time."""
+    residual = np.empty((len(observations), model.rows))
+    for states, rows, block in split_into_blocks(observations, 0):
+        around = _conditions_at(model, estimate, block, shared, states)
+        residual[rows] = compute_residuals(model, estimate, block, around)
+    return residual
+
+
+def _linearize_rows(
+    model: Model,
+    estimate: Estimate,
+    observations: Observations,
+    noise: Noise,
+    shared: Conditions | None,
+    *,
+    include_parameters: bool,
+) -> list[_RowBlock]:
+    """Linearise the examined observations in blocks, with their covariances.
+
+    The sensitivities to the parameters are computed only if they are included.
+    """
     blocks = []
     linearized = linearize if include_parameters else linearize_coordinates
     columns = len(list_parameters(model, estimate))
-    for states, rows, block in split_into_blocks(
-        select_states(observations, examined), columns
-    ):
+    for states, rows, block in split_into_blocks(observations, columns):
         around = _conditions_at(model, estimate, block, shared, states)
         linear_model = linearized(model, estimate, block, around)
         jacobian = linear_model.joint_jacobian[:, None]
         roots = compute_sensor_roots(model, estimate, block, noise)
+        roots = None if roots is None else roots[:, None]
         blocks.append(
             _RowBlock(
                 rows,
                 linear_model.sensitivities if include_parameters else None,
-                compute_measurement_covariances(
-                    noise,
-                    jacobian,
-                    model.rows,
-                    None if roots is None else roots[:, None],
-                ),
+                compute_measurement_covariances(noise, jacobian, model.rows, roots),
                 jacobian[:, 0] @ jacobian[:, 0].transpose(0, 2, 1),
             )
         )
-    return StudentizedResiduals(
-        residual, sensor_distance, in_sample, examined, blocks, noise
-    )
+    return blocks
 
 
 def _conditions_at(

@@ -2,13 +2,11 @@
 
 A message contains the joint states and the corners of a board from each sensor. The
 sensor of the camera states the corners in the camera's frame, the sensor of the arm in
-the frame of the board. The pose of the board is the rigid motion between the two [2]_.
+the frame of the board. The pose of the board is the rigid motion between the two.
 
 References
 ----------
 .. [1] ``rostopic echo -b calibration_data.bag -p /calibration_data > data.csv``
-.. [2] Umeyama, Least-squares estimation of transformation parameters between two point
-   patterns, IEEE Transactions on Pattern Analysis and Machine Intelligence 13, 1991.
 """
 
 from __future__ import annotations
@@ -22,6 +20,7 @@ import numpy as np
 
 from elastocal.errors import InputError
 from elastocal.exchange.board_poses import BoardPoses
+from elastocal.mechanics.kinematics import align_points
 
 _JOINT = re.compile(r"field\.joint_states\.(name|position)(\d+)")
 _POINT = re.compile(r"field\.observations(\d+)\.features(\d+)\.point\.([xyz])")
@@ -70,7 +69,7 @@ def read_robot_calibration(
             raise InputError(path, key, f"no joint {missing[0]}", ", ".join(states))
         angles.append([states[name] for name in names])
         in_camera, on_board = _read_corners(message, camera_sensor, path, key)
-        rotation, position = _fit_rigid_motion(on_board, in_camera)
+        rotation, position = align_points(on_board, in_camera)
         rotations.append(rotation)
         positions.append(position)
     return BoardPoses(
@@ -143,16 +142,3 @@ def _read_corners_of_sensors(
         numbers = [by_axis[index] for index in sorted(by_axis)]
         corners[sensor] = np.array(numbers[: 3 * (len(numbers) // 3)]).reshape(-1, 3)
     return corners
-
-
-def _fit_rigid_motion(
-    points: np.ndarray, moved: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Fit the rotation (3, 3) and translation (3,), m, that move points (M, 3) to `moved`."""
-    centre = points.mean(axis=0)
-    moved_centre = moved.mean(axis=0)
-    covariance = (moved - moved_centre).T @ (points - centre)
-    left_vectors, _, right_vectors = np.linalg.svd(covariance)
-    sign = np.sign(np.linalg.det(left_vectors @ right_vectors))
-    rotation = left_vectors @ np.diag([1.0, 1.0, sign]) @ right_vectors
-    return rotation, moved_centre - rotation @ centre

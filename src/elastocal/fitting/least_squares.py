@@ -36,7 +36,7 @@ from elastocal.fitting.normal_equations import (
 from elastocal.fitting.observations import sample_observations, split_into_blocks
 from elastocal.fitting.sensor_noise import compute_sensor_roots
 from elastocal.measuring.catalogue import list_kinds
-from elastocal.mechanics.kinematics import compute_point_poses
+from elastocal.mechanics.kinematics import align_points, compute_point_poses
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -829,50 +829,84 @@ def start_features(
     observations : M observations
     nominal_position, nominal_rotation : (M, 3) and (M, 3, 3) arrays, base axes
     """
-    plan = model.measuring
-    assert plan is not None
-    assert observations.channel is not None
     sessions = np.unique(observations.states.session)
-    known, position = _find_known_positions(model, observations)
-    if known.any():
+    estimate = _place_at_base(model, sessions)
+    is_located, position = _find_known_positions(model, observations)
+    if is_located.any():
         located = replace(
-            observations, position=position, channel=None, spread=None, rotation=None
+            observations,
+            state=observations.state[is_located],
+            target=observations.target[is_located],
+            position=position[is_located],
+            channel=None,
+            spread=None,
+            rotation=None,
         )
-        estimate = _register_known(
-            replace(model, rows=3, measuring=None),
+        estimate = _register_located(
+            model,
+            estimate,
             located,
-            (nominal_position, nominal_rotation),
-            known,
+            (nominal_position[is_located], nominal_rotation[is_located]),
         )
-    else:
-        estimate = _place_at_base(model, sessions)
-    session = np.searchsorted(
-        estimate.sessions, observations.states.session[observations.state]
+    in_session = _place_targets(
+        estimate, observations, nominal_position, nominal_rotation
     )
-    targets = nominal_position + np.einsum(
-        "mij,mj->mi", nominal_rotation, estimate.target_offset[observations.target]
-    )
-    frame = estimate.frame_rotation[session]
-    in_session = (frame @ targets[..., None])[..., 0] + estimate.frame_position[session]
-    feature_of_channel = np.array(
-        [-1 if entry.feature is None else entry.feature for entry in plan.channels]
-    )
-    features = []
-    for index, feature in enumerate(plan.features):
-        members = feature_of_channel[observations.channel] == index
-        start = list_kinds()[feature.kind].start
-        numbers = observations.position[members]
-        features.append(start(feature, in_session[members], numbers))
     return replace(
         estimate.with_effects(model.effects),
         coefficients=model.nominal_coefficients,
-        features=tuple(features),
+        features=_start_from_targets(model, observations, in_session),
     )
 
 
+def _place_targets(
+    estimate: Estimate,
+    observations: Observations,
+    nominal_position: np.ndarray,
+    nominal_rotation: np.ndarray,
+) -> np.ndarray:
+    """Compute positions (M, 3), m, of the targets in the frames of their sessions, from
+    nominal poses (M, 3), (M, 3, 3) of the measuring points in base axes."""
+    session = np.searchsorted(
+        estimate.sessions, observations.states.session[observations.state]
+    )
+    in_base = nominal_position + np.einsum(
+        "mij,mj->mi", nominal_rotation, estimate.target_offset[observations.target]
+    )
+    frame = estimate.frame_rotation[session]
+    rotated = (frame @ in_base[..., None])[..., 0]
+    return np.asarray(rotated + estimate.frame_position[session])
+
+
+def _start_from_targets(
+    model: Model, observations: Observations, position: np.ndarray
+) -> tuple[np.ndarray, ...]:
+    """Start each feature from the positions (M, 3), m, of its targets in the session."""
+    plan = model.measuring
+    assert plan is not None
+    assert observations.channel is not None
+    feature_of_channel = np.array(
+        [
+            -1 if channel.feature is None else channel.feature
+            for channel in plan.channels
+        ]
+    )
+    feature_of_row = feature_of_channel[observations.channel]
+    features = []
+    for index, feature in enumerate(plan.features):
+        rows = feature_of_row == index
+        kind = list_kinds()[feature.kind]
+        features.append(
+            kind.start(feature, position[rows], observations.position[rows])
+        )
+    return tuple(features)
+
+
 def _place_at_base(model: Model, sessions: np.ndarray) -> Estimate:
-    """Estimate with all sessions in base axes and targets where they are declared, or on
-    their measuring points."""
+    """Make an estimate with all sessions in base axes.
+
+    Targets are at their declared offsets, or on their measuring points if the offset is
+    unknown.
+    """
     count = len(sessions)
     rotations = [target.rotation or NO_ROTATION for target in model.targets]
     offsets = [target.offset_m or (0.0, 0.0, 0.0) for target in model.targets]
@@ -885,33 +919,34 @@ def _place_at_base(model: Model, sessions: np.ndarray) -> Estimate:
     )
 
 
-def _register_known(
+def _register_located(
     model: Model,
+    start: Estimate,
     located: Observations,
     nominal: tuple[np.ndarray, np.ndarray],
-    known: np.ndarray,
 ) -> Estimate:
-    """Register sessions by their observations with known positions (M,); others stay in
-    base axes."""
-    sessions = np.unique(located.states.session)
-    start = _place_at_base(model, sessions)
-    subset = replace(
-        located,
-        state=located.state[known],
-        target=located.target[known],
-        position=located.position[known],
-    )
+    """Register sessions by their observations with known positions.
+
+    Parameters
+    ----------
+    model : Model
+    start : estimate whose frames remain in sessions without such observations
+    located : L observations, whose positions are those of their targets in the session
+    nominal : positions (L, 3) and rotations (L, 3, 3), as `compute_nominal_poses`
+    """
     registered = register_to_poses(
-        replace(model, effects=()), subset, nominal[0][known], nominal[1][known]
+        replace(model, rows=3, measuring=None, effects=()), located, *nominal
     )
-    has_known = np.isin(sessions, located.states.session[located.state[known]])
+    is_registered = np.isin(start.sessions, located.states.session[located.state])
     return replace(
         start,
         frame_rotation=np.where(
-            has_known[:, None, None], registered.frame_rotation, start.frame_rotation
+            is_registered[:, None, None],
+            registered.frame_rotation,
+            start.frame_rotation,
         ),
         frame_position=np.where(
-            has_known[:, None], registered.frame_position, start.frame_position
+            is_registered[:, None], registered.frame_position, start.frame_position
         ),
         target_offset=registered.target_offset,
     )
@@ -920,25 +955,29 @@ def _register_known(
 def _find_known_positions(
     model: Model, observations: Observations
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find the observations (M,) whose target has a known position in the session, and
-    these positions (M, 3), m."""
+    """Find the observations whose target has a known position in the session.
+
+    Returns
+    -------
+    is_located : (M,) bool array
+    position : (M, 3) array, m, zero for the other observations
+    """
     plan = model.measuring
     assert plan is not None
     assert observations.channel is not None
-    known = np.zeros(len(observations), bool)
+    is_located = np.zeros(len(observations), bool)
     position = np.zeros((len(observations), 3))
     for number, channel in enumerate(plan.channels):
-        members = observations.channel == number
+        rows = observations.channel == number
         if channel.feature is not None:
-            feature = plan.features[channel.feature]
-            place = channel.kind.locate(feature)
-            if place is not None and channel.component in (None, 0):
-                known |= members
-                position[members] = place
+            stated = channel.kind.locate(plan.features[channel.feature])
+            if stated is not None and channel.component in (None, 0):
+                is_located |= rows
+                position[rows] = stated
         elif channel.component is None:
-            known |= members
-            position[members] = observations.position[members]
-    return known, position
+            is_located |= rows
+            position[rows] = observations.position[rows]
+    return is_located, position
 
 
 def compute_nominal_poses(
@@ -1045,19 +1084,6 @@ def _extrapolate_fixed_point(
     weights = np.linalg.lstsq(np.diff(changes, axis=0).T, changes[-1], rcond=None)[0]
     extrapolated = values[-1] - np.diff(values, axis=0).T @ weights
     return extrapolated.reshape(rounds[-1][1].shape)
-
-
-def align_points(
-    points: np.ndarray, measured: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation (3, 3) and translation (3,) from points (N, 3) to measured ones, by the
-    Kabsch algorithm."""
-    centre = points.mean(axis=0)
-    measured_centre = measured.mean(axis=0)
-    left, _, right = np.linalg.svd((measured - measured_centre).T @ (points - centre))
-    left[:, -1] *= np.sign(np.linalg.det(left @ right))
-    rotation = left @ right
-    return rotation, measured_centre - rotation @ centre
 
 
 def _average_target_rotations(

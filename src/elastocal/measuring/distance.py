@@ -14,6 +14,7 @@ from elastocal.measuring.protocol import (
     Unknown,
     describe_number,
     describe_point,
+    measure_distances,
     predict_along,
     read_number,
     read_vector,
@@ -48,7 +49,7 @@ class Distance(Kind):
     def start(
         self, feature: Feature, position: np.ndarray, numbers: np.ndarray
     ) -> np.ndarray:
-        """Start at the anchor that linear equations of squared distances have."""
+        """Start at the solution of the linear equations of squared distances."""
         zero = _get_zero(feature)
         anchor = read_vector(feature, "position_m")
         if anchor is None:
@@ -65,9 +66,7 @@ class Distance(Kind):
         values: np.ndarray,
     ) -> Prediction:
         """Predict distances from the anchor; see `Kind.evaluate`."""
-        from_anchor = position - values[:3]
-        distance = np.linalg.norm(from_anchor, axis=1)
-        direction = from_anchor / distance[:, None]
+        distance, direction = measure_distances(position, values[:3])
         by_unknowns = np.column_stack([-direction, np.ones(len(position))])
         residual = numbers[:, 0] - (distance + values[3])
         return predict_along(residual, direction, by_unknowns)
@@ -82,7 +81,7 @@ class Distance(Kind):
 
 
 def _get_zero(feature: Feature) -> float:
-    """Reading at no distance from which a fit starts, m."""
+    """Return the reading at zero distance, m; zero if it is left out or unknown."""
     if "zero_m" not in feature.stated:
         return 0.0
     return read_number(feature, "zero_m") or 0.0

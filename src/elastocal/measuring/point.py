@@ -1,7 +1,7 @@
 """A ball in a socket, a tip in a cone: the target is where a place is.
 
-A row has no number. What it says is that the target was in the place at these joint
-angles. The place is known, known to so much, or unknown.
+A row has no number. It states that the target was at the place at these joint angles.
+The place is exactly known, known with a standard deviation, or unknown.
 """
 
 from typing import ClassVar
@@ -14,6 +14,7 @@ from elastocal.measuring.protocol import (
     Prediction,
     Unknown,
     describe_point,
+    predict_position,
     read_vector,
 )
 
@@ -53,11 +54,8 @@ class Point(Kind):
         values: np.ndarray,
     ) -> Prediction:
         """Predict how far the target is from the place; see `Kind.evaluate`."""
-        count = len(position)
-        by_pose = np.zeros((count, 3, 6))
-        by_pose[:, :, :3] = np.eye(3)
-        by_place = np.tile(-np.eye(3), (count, 1, 1))
-        return Prediction(values - position, by_pose, by_place)
+        by_place = np.tile(-np.eye(3), (len(position), 1, 1))
+        return predict_position(values - position, by_place)
 
     def deviate(self, feature: Feature, values: np.ndarray) -> np.ndarray:
         """Return how far the place is from where it was stated."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from elastocal.measuring.protocol import Kind, Prediction
+from elastocal.measuring.protocol import Kind, Prediction, predict_position
 
 
 class Position(Kind):
@@ -21,10 +21,8 @@ class Position(Kind):
         values: np.ndarray,
     ) -> Prediction:
         """Predict positions; see `Kind.evaluate`."""
-        count = len(position)
-        by_pose = np.zeros((count, 3, 6))
-        by_pose[:, :, :3] = np.eye(3)
-        return Prediction(numbers[:, :3] - position, by_pose, np.zeros((count, 3, 0)))
+        residual = numbers[:, :3] - position
+        return predict_position(residual, np.zeros((len(position), 3, 0)))
 
 
 POSITION = Position()

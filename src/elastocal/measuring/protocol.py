@@ -1,4 +1,4 @@
-"""What a kind of measurement states, so that everything else treats all kinds alike.
+"""Interface of a kind of measurement, by which all kinds are treated alike.
 
 A kind predicts its measurements from the pose of a target in the frame of the session and
 from the unknowns of a feature: a place that is touched, a plane, an anchor. The engine
@@ -19,9 +19,10 @@ from elastocal.errors import InputError
 # Sizes of unknowns that may be anywhere in a workshop, m and rad.
 ANYWHERE_M = 1.0
 ANYWHERE_RAD = 1.0
-# Standard deviation of what is stated of a feature without one: a caliper, or a print.
+# Standard deviation of stated lengths whose standard deviation is left out, m: that of a
+# caliper or a 3D print.
 STATED_STD_M = 2e-4
-# Largest standard deviation that says anything of a feature, m or rad.
+# Upper bound on a stated standard deviation, m or rad; a larger one says nothing.
 LARGEST_STD = 1.0
 # A shorter vector has no direction.
 SHORTEST_DIRECTION = 1e-9
@@ -48,7 +49,7 @@ class Unknown:
 
 @dataclass(frozen=True)
 class Feature:
-    """Something that is touched, or against which is measured, as campaign.yaml has it.
+    """An object that is touched, or against which the target is measured.
 
     Attributes
     ----------
@@ -66,11 +67,11 @@ class Feature:
 
 @dataclass(frozen=True)
 class Prediction:
-    """Residuals of M measurements of one feature, and derivatives of what is predicted.
+    """Residuals of M measurements of one feature, and derivatives of the prediction.
 
     Attributes
     ----------
-    residual : (M, r) array, read minus predicted, m and rad.
+    residual : (M, r) array, measured minus predicted, m and rad.
     by_pose : (M, r, 6) array, derivative of the prediction in the position (m) and the
         rotation (rad) of the target, both in the axes of the session.
     by_unknowns : (M, r, K) array, derivative in the unknowns of the feature.
@@ -87,11 +88,11 @@ class NoiseShape:
 
     Attributes
     ----------
-    axes : (M, r, r) array, effect of a unit of each error on the residual, in the axes
-        of the session.
-    sizes : (M, r) array, standard deviation of each error over that of its group.
-    groups : (r,) int array, group of each error, 0 .. G-1; each group has a standard
-        deviation that is estimated.
+    axes : (M, r, r) array, change of the residual by a unit of each independent error,
+        in the axes of the session.
+    sizes : (M, r) array, standard deviation of each error divided by that of its group.
+    groups : (r,) int array, group of each error, 0 .. G-1. The standard deviation of
+        each group is estimated.
     """
 
     axes: np.ndarray
@@ -109,8 +110,8 @@ class Kind:
     numbers : numbers in a row: 1, 3 or 6. Several numbers are components of a vector
         in the axes of the session, m, followed by those of a rotation, rad.
     columns : columns that the user writes for a row.
-    is_converted : whether poses that are read are not yet those of the target.
-    touches : whether a table without its columns means zeros: contact.
+    is_converted : whether measured poses must be converted to those of the target.
+    touches : whether the columns may be left out, because contact means zero.
     keys : keys of a feature of this kind, each with its meaning; None if rows refer to
         no feature.
     """
@@ -201,7 +202,7 @@ class Kind:
         return values + step
 
     def state(self, values: np.ndarray) -> np.ndarray:
-        """Return what tables say of the unknowns (K,) of a feature: absolute values."""
+        """Return the absolute values of the unknowns (K,) of a feature, for tables."""
         return values
 
     def deviate(self, feature: Feature, values: np.ndarray) -> np.ndarray:
@@ -243,7 +244,7 @@ def read_number(feature: Feature, key: str) -> float | None:
 
 
 def read_std(feature: Feature, key: str, count: int = 1) -> np.ndarray:
-    """Read standard deviations (count,) of what is stated: one number, or one each."""
+    """Read standard deviations (count,): one number for all, or one for each."""
     stated = feature.stated.get(key, STATED_STD_M)
     listed = stated if isinstance(stated, list | tuple) else [stated] * count
     is_valid = len(listed) == count and all(map(_is_number, listed))
@@ -297,8 +298,27 @@ def span_plane(normal: np.ndarray) -> np.ndarray:
 def predict_along(
     residual: np.ndarray, direction: np.ndarray, by_unknowns: np.ndarray
 ) -> Prediction:
-    """Make the prediction of measurements (M,) that grow along directions (M, 3) or (3,) of
-    the target's position; derivatives (M, K) in the unknowns."""
+    """Make the prediction of scalar measurements with residuals (M,), m, whose gradients in
+    the target's position are unit vectors (M, 3) or (3,); derivatives (M, K) in the
+    unknowns."""
     by_pose = np.zeros((len(residual), 1, 6))
     by_pose[:, 0, :3] = direction
     return Prediction(residual[:, None], by_pose, by_unknowns[:, None])
+
+
+def predict_position(residual: np.ndarray, by_unknowns: np.ndarray) -> Prediction:
+    """Make the prediction of measurements of the target's position (M, 3), m, with
+    derivatives (M, 3, K) in the unknowns."""
+    by_pose = np.zeros((len(residual), 3, 6))
+    by_pose[:, :, :3] = np.eye(3)
+    return Prediction(residual, by_pose, by_unknowns)
+
+
+def measure_distances(
+    position: np.ndarray, centre: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the distances (M,), m, of positions (M, 3) from a centre (3,), and the unit
+    vectors (M, 3) from the centre to the positions."""
+    from_centre = position - centre
+    distance = np.linalg.norm(from_centre, axis=1)
+    return distance, from_centre / distance[:, None]

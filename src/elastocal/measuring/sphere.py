@@ -15,6 +15,7 @@ from elastocal.measuring.protocol import (
     Unknown,
     describe_number,
     describe_point,
+    measure_distances,
     predict_along,
     read_number,
     read_vector,
@@ -72,9 +73,7 @@ class Sphere(Kind):
         values: np.ndarray,
     ) -> Prediction:
         """Predict heights over the sphere; see `Kind.evaluate`."""
-        from_centre = position - values[:3]
-        distance = np.linalg.norm(from_centre, axis=1)
-        direction = from_centre / distance[:, None]
+        distance, direction = measure_distances(position, values[:3])
         by_unknowns = np.column_stack([-direction, -np.ones(len(position))])
         residual = numbers[:, 0] - (distance - values[3])
         return predict_along(residual, direction, by_unknowns)

@@ -540,3 +540,26 @@ def multiply_vectors(first: np.ndarray, second: np.ndarray, out: np.ndarray) -> 
         np.multiply(first[i - 2], second[i - 1], out=out[i])
         np.multiply(first[i - 1], second[i - 2], out=product)
         out[i] -= product
+
+
+def align_points(
+    points: np.ndarray, measured: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the rotation (3, 3) and translation (3,), m, that move points (N, 3) onto
+    measured ones best in the sense of least squares, by the Kabsch algorithm [1]_ [2]_.
+
+    References
+    ----------
+    .. [1] Kabsch, A solution for the best rotation to relate two sets of vectors, Acta
+       Crystallographica A32, 1976.
+    .. [2] Umeyama, Least-squares estimation of transformation parameters between two
+       point patterns, IEEE Transactions on Pattern Analysis and Machine Intelligence 13,
+       1991.
+    """
+    centre = points.mean(axis=0)
+    measured_centre = measured.mean(axis=0)
+    covariance = (measured - measured_centre).T @ (points - centre)
+    left_vectors, _, right_vectors = np.linalg.svd(covariance)
+    left_vectors[:, -1] *= np.sign(np.linalg.det(left_vectors @ right_vectors))
+    rotation = left_vectors @ right_vectors
+    return rotation, measured_centre - rotation @ centre

@@ -464,15 +464,7 @@ def fit_two_joints(
     along_joints = _project_on_joints(inputs, residual)
     largest_likelihood = -np.inf
     for pair in combinations(range(len(joints)), 2):
-        products = inputs.sum_gram(
-            ("pair", pair), partial(_compute_pair_gram, pair=pair)
-        )
-        cross_gram = geometry.axes.T @ products[:split]
-        gram = products[split:]
-        functions = compute_pair_functions(inputs.joint_angles[:, pair])
-        projection = (along_joints.T @ functions).ravel()
-        for penalty in _PENALTIES * geometry.mean_square(gram):
-            solution = geometry.solve_ridge(cross_gram, gram, projection, penalty)
+        for solution in _solve_pair(inputs, pair, geometry, along_joints):
             likelihood = _profile_likelihood(target, solution)
             if likelihood > largest_likelihood:
                 largest_likelihood = likelihood
@@ -487,6 +479,27 @@ def fit_two_joints(
     yield Predictor(
         mean, law=partial(_express_pair, coefficients, best_pair, len(joints))
     )
+
+
+def _solve_pair(
+    inputs: Inputs,
+    pair: tuple[int, int],
+    geometry: _GeometryBlock,
+    along_joints: np.ndarray,
+) -> Iterator[_RidgeSolution]:
+    """Solve the ridge regression on functions of two joints' angles for each penalty.
+
+    `along_joints` (M, n) are the products of the residuals with the displacement by
+    each joint.
+    """
+    products = inputs.sum_gram(("pair", pair), partial(_compute_pair_gram, pair=pair))
+    split = inputs.jacobian.shape[2]
+    cross_gram = geometry.axes.T @ products[:split]
+    gram = products[split:]
+    functions = compute_pair_functions(inputs.joint_angles[:, pair])
+    projection = (along_joints.T @ functions).ravel()
+    for penalty in _PENALTIES * geometry.mean_square(gram):
+        yield geometry.solve_ridge(cross_gram, gram, projection, penalty)
 
 
 def _express_pair(
