@@ -407,8 +407,8 @@ def _read_robot_for(folder: Path, robot: Path | None, *, force: bool) -> Robot:
     check_places(folder / DOCUMENT, folder / _ROBOT_FILE)
     _check_replaceable(folder, force=force)
     if (folder / DOCUMENT).exists() and not force:
-        found = "a campaign that is there already"
-        raise InputError(folder / DOCUMENT, "", found, "another folder, or --force")
+        problem = "a campaign that is there already"
+        raise InputError(folder / DOCUMENT, "", problem, "another folder, or --force")
     file = robot or folder / _ROBOT_FILE
     if not file.is_file():
         allowed = "--robot FILE; elastocal import urdf makes one"

@@ -340,16 +340,15 @@ def linearize_coordinates(
     sites = model.sites
     points = locate_targets(model, estimate)
     moved = compute_motion(sites.chain, coordinates, (*sites.tracked_points, *points))
-    count = len(observations)
-    position = np.empty((count, 3))
-    rotation = np.empty((count, 3, 3))
+    position = np.empty((len(observations), 3))
+    rotation = np.empty((len(observations), 3, 3))
     # The component comes first, so that the arithmetic of effects is contiguous along
     # the observations.
     jacobian = np.zeros(
         (
             6 if model.has_orientations else 3,
             sites.chain.coordinates + _count_target_coordinates(model),
-            count,
+            len(observations),
         )
     )
     for index, point in enumerate(points):
@@ -391,10 +390,19 @@ def _read_targets(
     predicted: tuple[np.ndarray, np.ndarray],
     jacobian: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Residual (M, rows), and Jacobian (M, rows, C) of what is read of the targets.
+    """Compute residuals and Jacobian of the measurements from those of target poses.
 
-    `predicted` are poses (M, 3), (M, 3, 3) in base axes, `jacobian` (M, 3 or 6, C) is
-    that of these poses. Fitted unknowns of features are additional coordinates.
+    Parameters
+    ----------
+    model, estimate, observations : as in `linearize_coordinates`
+    predicted : positions (M, 3), m, and rotations (M, 3, 3) of the targets, base axes
+    jacobian : (M, 3 or 6, C) array, derivative of these poses in the coordinates
+
+    Returns
+    -------
+    residual : (M, rows) array
+    jacobian : (M, rows, C + K) array; the K fitted unknowns of features are additional
+        coordinates
     """
     if model.measuring is None:
         residual = subtract_prediction(model, estimate, observations, *predicted)

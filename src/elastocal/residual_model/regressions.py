@@ -79,8 +79,8 @@ class Inputs:
         Displacement of the target by the joints first, then by base and links, m per rad
         or m; then by the effects of the model, see `selection.build_inputs`.
     parts : tuple of Inputs
-        Inputs that have these observations together, in any order, and whose Gram
-        matrices serve every union of them; empty if there are none.
+        Inputs that together have the same observations, in any order. Their stored Gram
+        matrices serve every union of them. Empty if there are none.
     """
 
     joint_angles: np.ndarray
@@ -110,18 +110,18 @@ class Inputs:
     def sum_gram(
         self, columns: Hashable, compute: Callable[[Inputs], np.ndarray]
     ) -> np.ndarray:
-        """Sum a Gram matrix over the observations, some at a time, and store it.
+        """Sum a Gram matrix over the observations in chunks, and store it.
 
-        Inputs with parts add up the stored matrices of these. The cross-validation fits
-        unions of the same few folds, again and again.
+        Inputs with parts add the stored matrices of their parts, because the
+        cross-validation fits many unions of the same few folds.
 
         Parameters
         ----------
         columns : name of the columns
-        compute : returns the matrix of some of the observations
+        compute : returns the matrix of a chunk of the observations
         """
         if self.parts:
-            grams = [part.sum_gram(columns, compute) for part in self.parts]
+            grams = [inputs.sum_gram(columns, compute) for inputs in self.parts]
             return np.asarray(np.sum(grams, axis=0))
         if columns not in self._grams:
             chunks = _split_into_chunks(self)
@@ -400,11 +400,11 @@ def _compute_pair_gram(inputs: Inputs, pair: tuple[int, int]) -> np.ndarray:
 
 
 def _multiply_with_all(jacobian: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Products (C + D, D) of the columns of a Jacobian (M, 3, C) and of some columns
-    (M, 3, D) with the latter."""
-    right = columns.reshape(-1, columns.shape[2])
-    left = jacobian.reshape(-1, jacobian.shape[2])
-    return np.concatenate([left.T @ right, right.T @ right])
+    """Multiply the columns of a Jacobian (M, 3, C) and further columns (M, 3, D) with the
+    further ones: (C + D, D) array."""
+    column_rows = columns.reshape(-1, columns.shape[2])
+    jacobian_rows = jacobian.reshape(-1, jacobian.shape[2])
+    return np.concatenate([jacobian_rows.T @ column_rows, column_rows.T @ column_rows])
 
 
 def _project_on_harmonics(

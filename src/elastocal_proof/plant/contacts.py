@@ -132,9 +132,9 @@ def see_board(
 ) -> tuple[np.ndarray, np.ndarray]:
     """See a board, (3,) and (3, 3) in base axes, from a camera that is the tool.
 
-    A corner is seen with the same error of angle everywhere. So the board is off across
-    the view in proportion to the range, and along the view and in its tilt by the square
-    of the range over the size of the board.
+    The angular error of a corner is the same everywhere. The error of the board across
+    the view is therefore proportional to the range. The errors along the view and of the
+    tilt also grow with the ratio of the range to the size of the board.
 
     Returns
     -------
@@ -150,5 +150,5 @@ def see_board(
     tilt = across / board_m * max(range_m / board_m, 1.0)
     turn = np.array([tilt, tilt, across / board_m]) * workshop.draws.standard_normal(3)
     # The board turns by these errors about its own axes, least about its normal.
-    seen = Rotation.from_matrix(turned) * Rotation.from_rotvec(turn)
-    return in_camera + shift, seen.as_rotvec()
+    measured = Rotation.from_matrix(turned) * Rotation.from_rotvec(turn)
+    return in_camera + shift, measured.as_rotvec()
