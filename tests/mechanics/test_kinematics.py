@@ -201,3 +201,14 @@ def test_rotation_vectors_agree_with_scipy(direction, angle):
         rtol=0,
         atol=1e-12,
     )
+
+
+def test_aligning_points_finds_the_motion_also_of_points_in_a_plane():
+    draws = np.random.default_rng(1)
+    points = draws.standard_normal((6, 3)) * [1.0, 1.0, 0.0]
+    translation = np.array([0.3, -0.2, 1.0])
+    for rotation in Rotation.random(20, random_state=1):
+        measured = translation + rotation.apply(points)
+        aligned, shift = kinematics.align_points(points, measured)
+        np.testing.assert_allclose(aligned, rotation.as_matrix(), atol=1e-12)
+        np.testing.assert_allclose(shift, translation, atol=1e-12)
