@@ -7,7 +7,7 @@ from support import refused
 
 from elastocal.measuring.plane import PLANE
 from elastocal.measuring.point import POINT
-from elastocal.measuring.protocol import read_std, span_plane
+from elastocal.measuring.protocol import find_centre, read_std, span_plane
 from elastocal.measuring.sphere import SPHERE
 
 
@@ -42,3 +42,15 @@ def test_two_unit_vectors_span_the_plane_of_a_normal():
     normal = np.array([1.0, 2.0, -2.0]) / 3.0
     axes = np.vstack([span_plane(normal), normal])
     np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-15)
+
+
+def test_the_centre_of_touched_spheres_is_found_whatever_their_common_radius():
+    generator = np.random.default_rng(2)
+    centre = np.array([0.4, -0.2, 0.7])
+    directions = generator.normal(size=(12, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    touched = centre + 0.05 * directions
+    np.testing.assert_allclose(find_centre(touched, np.zeros(12)), centre, atol=1e-12)
+    lengths = generator.uniform(0.5, 2.0, 12)
+    ends = centre + lengths[:, None] * directions
+    np.testing.assert_allclose(find_centre(ends, lengths), centre, atol=1e-12)

@@ -203,6 +203,12 @@ def test_rotation_vectors_agree_with_scipy(direction, angle):
     )
 
 
+def test_a_cross_matrix_multiplies_as_the_cross_product_from_the_left():
+    vectors, others = np.random.default_rng(1).normal(size=(2, 5, 3))
+    products = kinematics.form_cross_matrices(vectors) @ others[..., None]
+    np.testing.assert_allclose(products[..., 0], np.cross(vectors, others), atol=1e-15)
+
+
 def test_aligning_points_finds_the_motion_also_of_points_in_a_plane():
     draws = np.random.default_rng(1)
     points = draws.standard_normal((6, 3)) * [1.0, 1.0, 0.0]

@@ -26,11 +26,13 @@ from elastocal.fitting.model import (
 from elastocal.fitting.normal_equations import compute_whitening
 from elastocal.fitting.sensor_noise import compute_sensor_roots
 from elastocal.measuring.protocol import span_plane
+from elastocal.mechanics.kinematics import form_cross_matrices
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
 
 # Sizes of the errors that are tested: a millimetre, a milliradian, and a thousandth of
@@ -111,11 +113,12 @@ def find_unseen_errors(fitted: Fit, observations: Observations) -> list[Unseen]:
     """
     model = replace(fitted.model, effects=())
     estimate = replace(fitted.estimate, coefficients=(), shapes=())
-    rows = _whiten_rows(model, estimate, observations, fitted)
+    motions = _move_robot(model, estimate, observations)
+    rows = _whiten_rows(model, estimate, observations, fitted.noise, motions)
     unseen = [name for name, size in rows.count_std_errors().items() if size < _SEEN]
     if not unseen:
         return []
-    remedies = _list_further_rows(model, estimate, observations, fitted)
+    remedies = _list_further_rows(model, estimate, observations, fitted.noise, motions)
     sizes_with = {
         remedy: rows.append(_pad_fitted(further, rows)).count_std_errors()
         for remedy, further in remedies.items()
@@ -163,7 +166,7 @@ def predict_tip_error(fitted: Fit, observations: Observations) -> float | None:
     parameter that is not identified, its prior or its plausible size replaces the
     standard error. None if the model has no parameter of the robot.
     """
-    model = replace(fitted.model, measuring=None, shaped_noise=None, rows=3)
+    model = _track_targets(fitted.model, 3)
     estimate = replace(fitted.estimate, features=())
     plain = _as_positions(observations)
     conditions = evaluate_conditions(model, estimate, plain.states)
@@ -192,6 +195,11 @@ def _complete_covariance(fitted: Fit) -> np.ndarray:
     return covariance
 
 
+def _track_targets(model: Model, rows: int) -> Model:
+    """Return the model as if a tracker measured positions (3 rows) or poses (6 rows)."""
+    return replace(model, measuring=None, shaped_noise=None, rows=rows)
+
+
 def _as_positions(observations: Observations) -> Observations:
     """Return the observations as if positions had been measured."""
     return replace(
@@ -205,9 +213,8 @@ def _as_positions(observations: Observations) -> Observations:
 
 def _move_base(position: np.ndarray) -> np.ndarray:
     """Motion (M, 3, 6) of positions (M, 3) if the base is shifted or turned."""
-    turns = np.cross(np.eye(3), position[:, None]).transpose(0, 2, 1)
     shifts = np.tile(np.eye(3), (len(position), 1, 1))
-    return np.concatenate([shifts, turns], axis=2)
+    return np.concatenate([shifts, -form_cross_matrices(position)], axis=2)
 
 
 def _move_robot(
@@ -216,7 +223,7 @@ def _move_robot(
     """Motion (M, 6) of the targets by each error of the robot at its size."""
     plain = _as_positions(observations)
     turned = replace(plain, rotation=np.tile(np.eye(3), (len(plain), 1, 1)))
-    poses = replace(model, measuring=None, shaped_noise=None, rows=6)
+    poses = _track_targets(model, 6)
     conditions = evaluate_conditions(poses, estimate, turned.states)
     linear = linearize(poses, estimate, turned, conditions)
     position, _ = predict(poses, estimate, turned, conditions)
@@ -233,18 +240,22 @@ def _move_robot(
 
 
 def _whiten_rows(
-    model: Model, estimate: Estimate, observations: Observations, fitted: Fit
+    model: Model,
+    estimate: Estimate,
+    observations: Observations,
+    noise: Noise,
+    motions: Mapping[str, np.ndarray],
 ) -> _Rows:
     """Whiten the rows of the campaign, and append those of the priors of the parameters.
 
     Model and estimate have no effects, so the parameters are those of frames, targets
-    and features.
+    and features. `motions` (M, 6) move the targets by each error of the robot.
     """
     conditions = evaluate_conditions(model, estimate, observations.states)
     linear = linearize(model, estimate, observations, conditions)
-    roots = compute_sensor_roots(model, estimate, observations, fitted.noise)
+    roots = compute_sensor_roots(model, estimate, observations, noise)
     whitening = compute_whitening(
-        observations, linear.joint_jacobian, fitted.noise.without_pose_error, roots
+        observations, linear.joint_jacobian, noise.without_pose_error, roots
     )
     by_pose = _differentiate_by_pose(model, estimate, observations, conditions)
     columns = whitening.apply(linear.sensitivities)
@@ -252,7 +263,7 @@ def _whiten_rows(
     priors = np.diag([1.0 / p.prior_std if p.prior_std else 0.0 for p in parameters])
     width = len(parameters)
     errors = {}
-    for name, motion in _move_robot(model, estimate, observations).items():
+    for name, motion in motions.items():
         moved = (by_pose @ motion[..., None])[..., 0]
         white = whitening.apply(moved).ravel()
         errors[name] = np.concatenate([white, np.zeros(width)])
@@ -281,11 +292,16 @@ def _pad_fitted(further: _Rows, rows: _Rows) -> _Rows:
 
 
 def _list_further_rows(
-    model: Model, estimate: Estimate, observations: Observations, fitted: Fit
+    model: Model,
+    estimate: Estimate,
+    observations: Observations,
+    noise: Noise,
+    motions: Mapping[str, np.ndarray],
 ) -> dict[str, _Rows]:
-    """List further rows that a user could measure, by their description, cheapest first."""
+    """List further rows that a user could measure, by their description, cheapest first;
+    `motions` (M, 6) move the targets by each error of the robot."""
     plain = _as_positions(observations)
-    positions = replace(model, measuring=None, shaped_noise=None, rows=3)
+    positions = _track_targets(model, 3)
     bare = replace(estimate, features=())
     conditions = evaluate_conditions(positions, bare, plain.states)
     owners = [owner for owner, _ in list_parameters(positions, bare)]
@@ -293,8 +309,8 @@ def _list_further_rows(
         predict(positions, bare, plain, conditions)[0],
         linearize(positions, bare, plain, conditions).sensitivities,
         len(list_parameters(model, estimate)) - len(owners),
-        _move_robot(model, estimate, observations),
-        fitted.noise.position_m,
+        motions,
+        noise.position_m,
     )
     in_base = np.array([not owner.startswith("frame ") for owner in owners], bool)
     without_frames = replace(further, shared=further.shared * in_base)

@@ -4,14 +4,13 @@ that other installed packages offer by an entry point (see `io.plugins`)."""
 from __future__ import annotations
 
 from functools import cache
-from importlib import import_module
 from typing import TYPE_CHECKING
 
 import elastocal.effects
 from elastocal.effects.protocol import Effect, require_unique
 from elastocal.errors import InputError
 from elastocal.io import plugins
-from elastocal.io.modules import list_modules
+from elastocal.io.modules import list_entries
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -34,19 +33,9 @@ def list_effects() -> dict[str, Effect]:
 @cache
 def list_bundled_effects() -> dict[str, Effect]:
     """Effects of the modules of this package, by name, sorted."""
-    modules = [
-        import_module(f"elastocal.effects.{name}")
-        for name in list_modules(elastocal.effects)
-    ]
-    # A module that imports an effect of another one does not define it again.
-    effects = {
-        id(value): value
-        for module in modules
-        for value in vars(module).values()
-        if isinstance(value, Effect)
-    }
-    require_unique([effect.name for effect in effects.values()])
-    return dict(sorted((effect.name, effect) for effect in effects.values()))
+    effects = list_entries(elastocal.effects, Effect)
+    require_unique([effect.name for effect in effects])
+    return dict(sorted((effect.name, effect) for effect in effects))
 
 
 def candidates_on(sites: Sites) -> dict[str, Candidate]:

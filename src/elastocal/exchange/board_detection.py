@@ -20,6 +20,7 @@ import numpy as np
 from elastocal.errors import InputError, explain_missing_packages
 from elastocal.exchange.board_pattern import CHARUCO, BoardPattern
 from elastocal.exchange.camera_file import Camera
+from elastocal.mechanics.kinematics import form_cross_matrices
 
 # Columns of the table of poses, one row for each image.
 COLUMNS = (
@@ -360,8 +361,7 @@ def _estimate_std(
 def _left_jacobian(vector: np.ndarray) -> np.ndarray:
     """Derivative of a rotation in its rotation vector, (3, 3)."""
     angle = float(np.linalg.norm(vector))
-    x, y, z = vector
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    cross = form_cross_matrices(vector[None])[0]
     if angle < 1e-8:
         return np.eye(3) + 0.5 * cross
     first = (1.0 - np.cos(angle)) / angle**2

@@ -25,6 +25,7 @@ from elastocal.fitting.model import (
     get_parameter_bounds,
     get_parameter_values,
     list_parameters,
+    place_in_session,
 )
 from elastocal.fitting.normal_equations import (
     LeastSquaresProblem,
@@ -848,33 +849,15 @@ def start_features(
             located,
             (nominal_position[is_located], nominal_rotation[is_located]),
         )
-    in_session = _place_targets(
-        estimate, observations, nominal_position, nominal_rotation
+    targets = nominal_position + np.einsum(
+        "mij,mj->mi", nominal_rotation, estimate.target_offset[observations.target]
     )
+    in_session = place_in_session(estimate, observations, targets, nominal_rotation)
     return replace(
         estimate.with_effects(model.effects),
         coefficients=model.nominal_coefficients,
-        features=_start_from_targets(model, observations, in_session),
+        features=_start_from_targets(model, observations, in_session.position),
     )
-
-
-def _place_targets(
-    estimate: Estimate,
-    observations: Observations,
-    nominal_position: np.ndarray,
-    nominal_rotation: np.ndarray,
-) -> np.ndarray:
-    """Compute positions (M, 3), m, of the targets in the frames of their sessions, from
-    nominal poses (M, 3), (M, 3, 3) of the measuring points in base axes."""
-    session = np.searchsorted(
-        estimate.sessions, observations.states.session[observations.state]
-    )
-    in_base = nominal_position + np.einsum(
-        "mij,mj->mi", nominal_rotation, estimate.target_offset[observations.target]
-    )
-    frame = estimate.frame_rotation[session]
-    rotated = (frame @ in_base[..., None])[..., 0]
-    return np.asarray(rotated + estimate.frame_position[session])
 
 
 def _start_from_targets(

@@ -217,6 +217,12 @@ class Estimate:
             shapes=(*self.shapes, *shapes),
         )
 
+    def index_sessions(self, observations: Observations) -> np.ndarray:
+        """Find the index, 0 .. K-1, of the session of each observation, (M,) array."""
+        return np.searchsorted(
+            self.sessions, observations.states.session[observations.state]
+        )
+
 
 def _start_of_shapes(effect: Candidate) -> np.ndarray:
     return np.array([shape.start for shape in effect.shapes])
@@ -667,9 +673,7 @@ def place_in_session(
 ) -> SessionPoses:
     """Transform predicted poses (M, 3), (M, 3, 3) from base axes into the frames of the
     sessions of the observations."""
-    session = np.searchsorted(
-        estimate.sessions, observations.states.session[observations.state]
-    )
+    session = estimate.index_sessions(observations)
     frame = estimate.frame_rotation[session]
     in_session = (frame @ position[..., None])[..., 0]
     in_session += estimate.frame_position[session]
@@ -683,9 +687,7 @@ def transform_to_base(
 
     Returns positions (M, 3), and rotations (M, 3, 3) or None.
     """
-    session = np.searchsorted(
-        estimate.sessions, observations.states.session[observations.state]
-    )
+    session = estimate.index_sessions(observations)
     into_base = estimate.frame_rotation[session].transpose(0, 2, 1)
     relative = observations.position - estimate.frame_position[session]
     position = (into_base @ relative[..., None])[..., 0]

@@ -606,9 +606,7 @@ def estimate_shaped_noise(case: Case) -> ShapedNoise | None:
     shaped = ShapedNoise(kind, plan.camera, np.ones(1))
     for _ in range(_SHAPE_ROUNDS):
         fitted = fit_declared_model(model, observations, noise)
-        session = np.searchsorted(
-            fitted.estimate.sessions, observations.states.session[observations.state]
-        )
+        session = fitted.estimate.index_sessions(observations)
         frame = fitted.estimate.frame_rotation[session, None]
         vectors = fitted.residual.reshape(len(observations), 2, 3, 1)
         residual = (frame @ vectors).reshape(len(observations), 6)

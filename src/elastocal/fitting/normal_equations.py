@@ -23,6 +23,7 @@ from elastocal.fitting.model import (
 )
 from elastocal.fitting.observations import batch_groups_by_size, split_into_blocks
 from elastocal.fitting.sensor_noise import compute_sensor_roots
+from elastocal.mechanics.kinematics import form_cross_matrices
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -540,10 +541,7 @@ class LeastSquaresProblem:
         )
         # Single numbers have no axes.
         if (turn != np.eye(3)).any() and self.model.rows > 1:
-            states = self.observations.states
-            session = np.searchsorted(
-                estimate.sessions, states.session[self.observations.state]
-            )
+            session = estimate.index_sessions(self.observations)
             vectors = residual.reshape(len(residual), -1, 3)
             turned = vectors @ turn[session].transpose(0, 2, 1)
             residual = turned.reshape(residual.shape)
@@ -635,6 +633,5 @@ def _map_to_rotation_vectors(residual: np.ndarray) -> np.ndarray:
     """
     maps = np.tile(np.eye(residual.shape[1]), (len(residual), 1, 1))
     if residual.shape[1] > 3:
-        half_cross = 0.5 * np.cross(residual[:, None, 3:], np.eye(3))
-        maps[:, 3:, 3:] += half_cross.transpose(0, 2, 1)
+        maps[:, 3:, 3:] += 0.5 * form_cross_matrices(residual[:, 3:])
     return maps

@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from elastocal.fitting.observations import Observations
     from elastocal.measuring.protocol import Kind, NoiseShape
 
+# Median of the square of a standard normal number.
+_MEDIAN_OF_SQUARES = 0.4549364
+
 
 @dataclass(frozen=True)
 class ShapedNoise:
@@ -76,9 +79,7 @@ def compute_sensor_roots(
             return None
         deviations = observations.spread[:, None] * noise.sensor_std(rows)
         return deviations[:, None] * np.eye(rows)
-    session = np.searchsorted(
-        estimate.sessions, observations.states.session[observations.state]
-    )
+    session = estimate.index_sessions(observations)
     into_base = estimate.frame_rotation[session].transpose(0, 2, 1)
     roots = model.shaped_noise.compute_roots(observations)
     scale = noise.position_m / model.shaped_noise.reference_m
@@ -110,7 +111,3 @@ def estimate_factors(
         squares = errors[:, shape.groups == group] ** 2
         factors.append(np.sqrt(np.median(squares) / _MEDIAN_OF_SQUARES))
     return replace(shaped, factors=np.array(factors)).refer(observations)
-
-
-# Median of the square of a standard normal number.
-_MEDIAN_OF_SQUARES = 0.4549364

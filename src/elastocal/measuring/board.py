@@ -13,6 +13,7 @@ import numpy as np
 
 from elastocal.measuring.pose import Pose
 from elastocal.measuring.protocol import NoiseShape
+from elastocal.mechanics.kinematics import form_cross_matrices
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -71,14 +72,9 @@ class Board(Pose):
             inversion = np.zeros((len(board_position), 6, 6))
             inversion[:, :3, :3] = -rotation
             inversion[:, 3:, 3:] = -rotation
-            inversion[:, :3, 3:] = -rotation @ _cross_matrices(board_position)
+            inversion[:, :3, 3:] = -rotation @ form_cross_matrices(board_position)
             axes = inversion @ axes
         return NoiseShape(axes, sizes, np.array([0, 0, 1, 2, 2, 3]))
-
-
-def _cross_matrices(vectors: np.ndarray) -> np.ndarray:
-    """Matrices (M, 3, 3) that multiply other vectors as vectors (M, 3) do from the left."""
-    return np.cross(vectors[:, None], np.eye(3)).transpose(0, 2, 1)
 
 
 BOARD = Board()

@@ -4,11 +4,10 @@ installed packages offer by an entry point (see `io.plugins`)."""
 from __future__ import annotations
 
 from functools import cache
-from importlib import import_module
 
 import elastocal.measuring
 from elastocal.io import plugins
-from elastocal.io.modules import list_modules
+from elastocal.io.modules import list_entries
 from elastocal.measuring.protocol import Kind
 
 
@@ -26,10 +25,5 @@ def list_kinds() -> dict[str, Kind]:
 @cache
 def list_bundled_kinds() -> dict[str, Kind]:
     """Kinds of the modules of this package, by name, sorted."""
-    kinds = {}
-    for name in list_modules(elastocal.measuring):
-        module = import_module(f"elastocal.measuring.{name}")
-        for value in vars(module).values():
-            if isinstance(value, Kind):
-                kinds[value.name] = value
-    return dict(sorted(kinds.items()))
+    kinds = list_entries(elastocal.measuring, Kind)
+    return dict(sorted((kind.name, kind) for kind in kinds))

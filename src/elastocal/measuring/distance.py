@@ -14,6 +14,8 @@ from elastocal.measuring.protocol import (
     Unknown,
     describe_number,
     describe_point,
+    deviate_point,
+    find_centre,
     measure_distances,
     predict_along,
     read_number,
@@ -53,9 +55,7 @@ class Distance(Kind):
         zero = _get_zero(feature)
         anchor = read_vector(feature, "position_m")
         if anchor is None:
-            squares = (position**2).sum(axis=1) - (numbers[:, 0] - zero) ** 2
-            columns = np.column_stack([2.0 * position, np.ones(len(position))])
-            anchor = np.linalg.lstsq(columns, squares, rcond=None)[0][:3]
+            anchor = find_centre(position, numbers[:, 0] - zero)
         return np.array([*anchor, zero])
 
     def evaluate(
@@ -73,11 +73,8 @@ class Distance(Kind):
 
     def deviate(self, feature: Feature, values: np.ndarray) -> np.ndarray:
         """Return how far anchor and zero are from what was stated."""
-        anchor = read_vector(feature, "position_m")
-        deviation = np.array([0.0, 0.0, 0.0, values[3] - _get_zero(feature)])
-        if anchor is not None:
-            deviation[:3] = values[:3] - anchor
-        return deviation
+        of_zero = values[3] - _get_zero(feature)
+        return np.array([*deviate_point(feature, values[:3]), of_zero])
 
 
 def _get_zero(feature: Feature) -> float:

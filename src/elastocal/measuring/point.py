@@ -14,6 +14,7 @@ from elastocal.measuring.protocol import (
     Prediction,
     Unknown,
     describe_point,
+    deviate_point,
     predict_position,
     read_vector,
 )
@@ -59,8 +60,7 @@ class Point(Kind):
 
     def deviate(self, feature: Feature, values: np.ndarray) -> np.ndarray:
         """Return how far the place is from where it was stated."""
-        stated = read_vector(feature, "position_m")
-        return np.zeros(3) if stated is None else values - stated
+        return deviate_point(feature, values)
 
 
 POINT = Point()

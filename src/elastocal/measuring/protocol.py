@@ -278,6 +278,15 @@ def describe_point(
     )
 
 
+def deviate_point(
+    feature: Feature, position: np.ndarray, key: str = "position_m"
+) -> np.ndarray:
+    """Return how far a point (3,), m, is from where it was stated; zero if it is
+    unknown."""
+    stated = read_vector(feature, key)
+    return np.zeros(3) if stated is None else position - stated
+
+
 def describe_number(feature: Feature, key: str, std_key: str) -> Unknown:
     """Describe one length of a feature: unknown, or stated with a prior."""
     name = key.removesuffix("_m")
@@ -312,6 +321,21 @@ def predict_position(residual: np.ndarray, by_unknowns: np.ndarray) -> Predictio
     by_pose = np.zeros((len(residual), 3, 6))
     by_pose[:, :, :3] = np.eye(3)
     return Prediction(residual, by_pose, by_unknowns)
+
+
+def find_centre(position: np.ndarray, height: np.ndarray) -> np.ndarray:
+    """Find the centre (3,), m, of a sphere of unknown radius, algebraically.
+
+    Parameters
+    ----------
+    position : (M, 3) array, m.
+    height : (M,) array, m, such that the squared distances from the centre, less the
+        squared heights, are equal.
+    """
+    columns = np.column_stack([2.0 * position, np.ones(len(position))])
+    squares = (position**2).sum(axis=1) - height**2
+    centre: np.ndarray = np.linalg.lstsq(columns, squares, rcond=None)[0][:3]
+    return centre
 
 
 def measure_distances(

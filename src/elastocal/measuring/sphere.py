@@ -15,6 +15,8 @@ from elastocal.measuring.protocol import (
     Unknown,
     describe_number,
     describe_point,
+    deviate_point,
+    find_centre,
     measure_distances,
     predict_along,
     read_number,
@@ -53,12 +55,9 @@ class Sphere(Kind):
         ----------
         .. [1] Pratt, Direct least-squares fitting of algebraic surfaces, 1987.
         """
-        columns = np.column_stack([2.0 * position, np.ones(len(position))])
-        squares = (position**2).sum(axis=1)
-        solution = np.linalg.lstsq(columns, squares, rcond=None)[0]
         centre = read_vector(feature, "position_m")
         if centre is None:
-            centre = solution[:3]
+            centre = find_centre(position, np.zeros(len(position)))
         radius = read_number(feature, "radius_m")
         if radius is None:
             distances = np.linalg.norm(position - centre, axis=1)
@@ -80,14 +79,9 @@ class Sphere(Kind):
 
     def deviate(self, feature: Feature, values: np.ndarray) -> np.ndarray:
         """Return how far centre and radius are from what was stated."""
-        deviation = np.zeros(4)
-        centre = read_vector(feature, "position_m")
         radius = read_number(feature, "radius_m")
-        if centre is not None:
-            deviation[:3] = values[:3] - centre
-        if radius is not None:
-            deviation[3] = values[3] - radius
-        return deviation
+        of_radius = 0.0 if radius is None else values[3] - radius
+        return np.array([*deviate_point(feature, values[:3]), of_radius])
 
 
 SPHERE = Sphere()

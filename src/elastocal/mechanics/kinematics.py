@@ -542,6 +542,12 @@ def multiply_vectors(first: np.ndarray, second: np.ndarray, out: np.ndarray) -> 
         out[i] -= product
 
 
+def form_cross_matrices(vectors: np.ndarray) -> np.ndarray:
+    """Form the matrices (M, 3, 3) that multiply other vectors as the cross product with
+    vectors (M, 3) from the left does."""
+    return np.cross(vectors[:, None], np.eye(3)).transpose(0, 2, 1)
+
+
 def align_points(
     points: np.ndarray, measured: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:

@@ -189,10 +189,7 @@ def _refit_placement(
     fitted: Fit, observations: Observations, correction: np.ndarray
 ) -> Estimate:
     """Fit frames and targets to the residuals that a correction (M, 3), m, leaves."""
-    states = observations.states
-    session = np.searchsorted(
-        fitted.estimate.sessions, states.session[observations.state]
-    )
+    session = fitted.estimate.index_sessions(observations)
     rotation = fitted.estimate.frame_rotation[session]
     position = observations.position - (rotation @ correction[..., None])[..., 0]
     return fit_placement(fitted, fitted.model, replace(observations, position=position))
