@@ -14,14 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.counting import list_first
-from elastocal.fitting.features import evaluate_channels
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import (
     evaluate_conditions,
     find_placement_parameters,
     list_parameters,
-    place_in_session,
     predict,
+    predict_channels,
 )
 from elastocal.fitting.normal_equations import compute_whitening
 from elastocal.fitting.sensor_noise import compute_sensor_roots
@@ -277,10 +276,7 @@ def _differentiate_by_pose(
     if model.measuring is None:
         return np.tile(np.eye(observations.rows, 6), (len(observations), 1, 1))
     poses = predict(model, estimate, observations, conditions)
-    placed = place_in_session(estimate, observations, *poses)
-    return evaluate_channels(
-        model.measuring, observations, placed, estimate.features
-    ).by_pose
+    return predict_channels(model, estimate, observations, *poses).by_pose
 
 
 def _pad_fitted(further: _Rows, rows: _Rows) -> _Rows:

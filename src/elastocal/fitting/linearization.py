@@ -26,7 +26,6 @@ from elastocal.effects.conditions import (
     replace_springs,
     replace_total_load,
 )
-from elastocal.fitting.features import evaluate_channels
 from elastocal.fitting.model import (
     LOAD_EFFECTS,
     compute_displaced_coordinates,
@@ -34,7 +33,7 @@ from elastocal.fitting.model import (
     get_joint_compliances,
     get_mass_corrections,
     locate_targets,
-    place_in_session,
+    predict_channels,
     subtract_prediction,
     sum_displacements,
     update_springs_and_masses,
@@ -407,12 +406,7 @@ def _read_targets(
     if model.measuring is None:
         residual = subtract_prediction(model, estimate, observations, *predicted)
         return residual, jacobian
-    channels = evaluate_channels(
-        model.measuring,
-        observations,
-        place_in_session(estimate, observations, *predicted),
-        estimate.features,
-    )
+    channels = predict_channels(model, estimate, observations, *predicted)
     by_pose = channels.by_pose[..., : jacobian.shape[1]] @ jacobian
     return channels.residual, np.concatenate([by_pose, channels.by_unknowns], axis=2)
 

@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.observations import States
     from elastocal.fitting.sensor_noise import ShapedNoise
     from elastocal.measuring.channels import MeasuringPlan
+    from elastocal.measuring.protocol import Prediction
     from elastocal.mechanics.chain import MeasuringPoint
 
 # Plausible sizes of frames and targets, which may be anywhere in a workshop.
@@ -636,12 +637,7 @@ def compute_residual_vectors(
     if model.measuring is None or model.rows > 1:
         return compute_residuals(model, estimate, observations, conditions)
     poses = predict(model, estimate, observations, conditions)
-    prediction = evaluate_channels(
-        model.measuring,
-        observations,
-        place_in_session(estimate, observations, *poses),
-        estimate.features,
-    )
+    prediction = predict_channels(model, estimate, observations, *poses)
     return prediction.residual * prediction.by_pose[:, 0, :3]
 
 
@@ -655,14 +651,27 @@ def subtract_prediction(
     """Subtract predicted poses (M, 3), (M, 3, 3) from measured ones; see
     `compute_residuals`."""
     if model.measuring is not None:
-        poses = place_in_session(estimate, observations, position, rotation)
-        return evaluate_channels(
-            model.measuring, observations, poses, estimate.features
+        return predict_channels(
+            model, estimate, observations, position, rotation
         ).residual
     measured, measured_rotation = transform_to_base(estimate, observations)
     if measured_rotation is None:
         return measured - position
     return compute_pose_differences(measured, measured_rotation, position, rotation)
+
+
+def predict_channels(
+    model: Model,
+    estimate: Estimate,
+    observations: Observations,
+    position: np.ndarray,
+    rotation: np.ndarray,
+) -> Prediction:
+    """Predict the measurements of a measuring plan, with derivatives in the poses of the
+    targets and in the features, from predicted poses (M, 3), (M, 3, 3); base axes."""
+    assert model.measuring is not None
+    poses = place_in_session(estimate, observations, position, rotation)
+    return evaluate_channels(model.measuring, observations, poses, estimate.features)
 
 
 def place_in_session(
