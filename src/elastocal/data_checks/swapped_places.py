@@ -6,7 +6,7 @@ errors of a robot.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,14 +15,16 @@ from elastocal.campaigns.campaign import group_equal_rows
 from elastocal.counting import format_count
 from elastocal.data_checks.placement import IMPLAUSIBLE_M, root_mean_square
 from elastocal.data_checks.protocol import Fault, Value
-from elastocal.mechanics.kinematics import compute_poses
+from elastocal.fitting.least_squares import compute_nominal_poses
+from elastocal.fitting.model import build_declared_model
+from elastocal.fitting.observations import separate_measurements
+from elastocal.measuring.point import POINT
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from elastocal.campaigns.campaign import Campaign
 
-POINT = "point"
 # A measurement belongs to another place if that place is nearer by this factor. The
 # sockets of MUKCa are 50 mm apart. The nominal models of the nine arms measured in them
 # are off by up to 26 mm; the wrong socket is then 1.7 times as far away. Five exchanged
@@ -64,7 +66,7 @@ def find_swapped_places(campaign: Campaign) -> list[Fault]:
     """
     channels = campaign.measuring.channels
     is_point = all(
-        channel.kind.name == POINT and channel.component is None for channel in channels
+        channel.kind is POINT and channel.component is None for channel in channels
     )
     if not channels or not is_point:
         return []
@@ -163,19 +165,12 @@ def _locate_touches(campaign: Campaign) -> _Touches:
 def _compute_target_poses(campaign: Campaign) -> tuple[np.ndarray, np.ndarray]:
     """Compute nominal positions (N, 3), m, and rotations (N, 3, 3) of the targets in the
     base frame; a target with an unknown offset is on its measuring point."""
-    measurements = campaign.measurements
-    count = len(measurements)
-    position = np.zeros((count, 3))
-    rotation = np.zeros((count, 3, 3))
-    chain = campaign.robot.chain
-    for index, target in enumerate(campaign.targets):
-        rows = measurements.target == index
-        offset_m = target.offset_m or (0.0, 0.0, 0.0)
-        point = replace(chain.point(target.point), offset_m=tuple(offset_m))
-        position[rows], rotation[rows] = compute_poses(
-            chain, measurements.joint_angles[rows], point
-        )
-    return position, rotation
+    position, rotation = compute_nominal_poses(
+        build_declared_model(campaign), separate_measurements(campaign.measurements)
+    )
+    offsets_m = [target.offset_m or (0.0, 0.0, 0.0) for target in campaign.targets]
+    offset_m = np.array(offsets_m)[campaign.measurements.target]
+    return position + (rotation @ offset_m[..., None])[..., 0], rotation
 
 
 def _fit_places(touches: _Touches) -> tuple[np.ndarray, np.ndarray]:

@@ -23,10 +23,11 @@ from elastocal.exchange.camera_file import Camera
 from elastocal.mechanics.kinematics import form_cross_matrices
 
 # Columns of the table of poses, one row for each image.
-COLUMNS = (
-    "image", "x", "y", "z", "rx", "ry", "rz", "corners", "residual_px",
+POSE_COLUMNS = ("x", "y", "z", "rx", "ry", "rz")
+STD_COLUMNS = (
     "std_x_m", "std_y_m", "std_z_m", "std_rx_rad", "std_ry_rad", "std_rz_rad",
 )  # fmt: skip
+COLUMNS = ("image", *POSE_COLUMNS, "corners", "residual_px", *STD_COLUMNS)
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm")
 # A pose has six parameters; the noise is estimated from the remaining degrees of freedom.
 _FEWEST_CORNERS = 6

@@ -9,12 +9,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.errors import InputError
+from elastocal.exchange.board_detection import POSE_COLUMNS, STD_COLUMNS
 from elastocal.exchange.board_poses import BoardPoses
 
-_NUMBERS = (
-    "x", "y", "z", "rx", "ry", "rz",
-    "std_x_m", "std_y_m", "std_z_m", "std_rx_rad", "std_ry_rad", "std_rz_rad",
-)  # fmt: skip
+_NUMBERS = (*POSE_COLUMNS, *STD_COLUMNS)
 
 
 def is_detected_poses(header: str) -> bool:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.errors import InputError, explain_missing_packages
+from elastocal.exchange.board_pattern import CHARUCO
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,7 +57,7 @@ def draw_board(pattern: BoardPattern, paper: str) -> Figure:
     axes.set_ylim(sheet[1], 0.0)
     axes.set_axis_off()
     corner = np.array([(sheet[0] - width) / 2, _MARGIN_MM + (space[1] - height) / 2])
-    if pattern.kind == "charuco":
+    if pattern.kind == CHARUCO:
         _fill_squares(axes, pattern, board, corner)
     _fill_markers(axes, board, corner)
     _draw_ruler(axes, pattern, corner[0], sheet[1] - _MARGIN_MM - _FOOT_MM / 2)
