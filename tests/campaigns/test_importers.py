@@ -332,23 +332,38 @@ def test_each_pose_of_the_motoman_counts_once_and_poses_without_images_do_not_co
     )
 
 
-def test_files_of_sockets_become_a_campaign_of_the_last_joint(tmp_path):
-    importer = IMPORTERS["mukca_panda"]
+@pytest.fixture
+def recordings(tmp_path):
+    """Return files of 12 poses in each of two sockets."""
     paths = [tmp_path / "front" / f"hole_{socket}.csv" for socket in (0, 1)]
     paths[0].parent.mkdir()
     for path in paths:
         angles = np.random.default_rng(1).uniform(-1, 1, (12, 7))
         np.savetxt(path, angles, delimiter=",")
+    return paths
+
+
+def test_files_of_sockets_become_a_campaign_of_the_last_joint(recordings, tmp_path):
+    importer = IMPORTERS["mukca_panda"]
     folder = tmp_path / "mine"
     importer.write_campaign(
-        paths, folder, ROBOTS, "mine", holdout={"fraction": 0.3, "seed": 1}
+        recordings, folder, ROBOTS, "mine", holdout={"fraction": 0.3, "seed": 1}
     )
     campaign = read_campaign(read_campaign_folder(folder, ROBOTS))
     assert campaign.robot.joints == 7
     document = yaml.safe_load((folder / "campaign.yaml").read_text())
     assert document["distances"][0]["distance_m"] == 0.05
-    with refused(paths[0], "", "joint angles alone"):
-        importer.read(paths[0])
+    with refused(recordings[0], "", "joint angles alone"):
+        importer.read(recordings[0])
+
+
+def test_folds_hold_out_poses_of_recordings_in_sockets_too(recordings, tmp_path):
+    folder = tmp_path / "mine"
+    IMPORTERS["mukca_panda"].write_campaign(
+        recordings, folder, ROBOTS, "mine", fold={"number": 2, "of": 3}
+    )
+    campaign = read_campaign(read_campaign_folder(folder, ROBOTS))
+    assert campaign.holdout["poses"] == [[0, pose] for pose in range(1, 24, 3)]
 
 
 def test_the_campaigns_of_the_repository_are_read(config, config_folder):

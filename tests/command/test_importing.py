@@ -1,6 +1,7 @@
 """`elastocal import`: robot files from URDF and from DH tables, and the table of another
 program as measurements.csv."""
 
+import inspect
 import itertools
 
 import numpy as np
@@ -12,6 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.reading import read_campaign, read_robot
+from elastocal.campaigns.socket_recordings import SOCKET_DISTANCE_M
+from elastocal.command import importing
 
 ARM = (
     link("base"),
@@ -223,6 +226,12 @@ def test_recordings_in_sockets_become_a_campaign_that_can_be_read(
     assert "that are there already" in refusal(*command)
     assert elastocal(*command, "--force").exit_code == 0
     assert "less than 1 m" in refusal(*command, "--force", "--distance", "50")
+
+
+def test_sockets_are_by_default_as_far_apart_as_mukca_prints_them():
+    # The command states the number itself, because it starts without numpy.
+    default = inspect.signature(importing.sockets).parameters["distance"].default
+    assert default == SOCKET_DISTANCE_M
 
 
 def test_poses_of_a_board_become_a_campaign_that_can_be_read(

@@ -10,14 +10,13 @@ from scipy.spatial.transform import Rotation
 from support import refused
 
 from elastocal.exchange.board_poses import (
-    BESIDE_ROBOT,
-    ON_ROBOT,
     BoardPoses,
     check_poses,
     describe_board_campaign,
     tabulate_board_poses,
 )
 from elastocal.io.documents import check_document
+from elastocal.measuring.board import BESIDE_ROBOT, ON_ROBOT
 
 ANGLES, ROTATION, POSITION = make_board_poses()
 POSES = BoardPoses("poses.yaml", POSITION, ROTATION, ANGLES)

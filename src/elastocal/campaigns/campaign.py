@@ -18,6 +18,11 @@ from elastocal.mechanics.components import COMPONENT_NAMES, WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
 
 DOCUMENT = "campaign.yaml"
+# Robot file in the folder of a campaign whose robot is not one of the project's.
+ROBOT_FILE = "robot.yaml"
+# Effects that a campaign of an uncalibrated robot declares: no such data can be fitted
+# without them.
+GEOMETRY = ("joint_offset", "link_geometry")
 DEFAULT_HOLDOUT = {"fraction": 0.3, "seed": 1}
 # Values of ``remainder``: no residual model, or the one with the best validation error.
 NO_REMAINDER = "none"

@@ -8,7 +8,6 @@ on an unloaded flange, measured by a tracker whose frame is unknown.
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -20,12 +19,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy
 
+from elastocal.campaigns.campaign import GEOMETRY
 from elastocal.campaigns.campaign_folder import (
     CampaignFolder,
     check_workflow_path,
     read_campaign_folder,
 )
 from elastocal.campaigns.holdout import number_close_points
+from elastocal.campaigns.measurements import name_joint_columns
 from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.socket_recordings import (
     SOCKET_DISTANCE_M,
@@ -43,6 +44,7 @@ from elastocal.io.documents import (
 )
 from elastocal.io.json_files import read_json
 from elastocal.io.plugins import IMPORTERS, load_plugins
+from elastocal.io.records import refuse_other_contents
 
 # Environment variable: a folder that already has the files, for machines without a
 # network.
@@ -145,10 +147,7 @@ def fetch(
         raise InputError("public data", "", repr(name), ", ".join(files))
     file = files[name]
     if path := _find_copy(name, file, folder, box):
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()
-        if digest != file.sha256:
-            allowed = f"{file.sha256}, of {file.address}"
-            raise InputError(path, "", f"SHA-256 {digest}", allowed)
+        refuse_other_contents(path, file.sha256, f"{file.sha256}, of {file.address}")
         return path
     # The rules only look for files, so that they need no library for downloads.
     import pooch
@@ -253,6 +252,22 @@ def _read_motoman(path: str | Path) -> PublicMeasurements:
     return PublicMeasurements(rows[:, 7:13], {"reflector": rows[:, 19:22]}, {})
 
 
+@dataclass(frozen=True)
+class _ImportedCampaign:
+    """Contents of a campaign's folder.
+
+    Attributes
+    ----------
+    document : contents of ``campaign.yaml``.
+    table : columns of the measurements.
+    joints : number of joints of the robot.
+    """
+
+    document: dict[str, Any]
+    table: Mapping[str, np.ndarray]
+    joints: int
+
+
 _MAT_FILES = {"fanuc_static": _read_fanuc_static, "motoman": _read_motoman}
 
 
@@ -304,6 +319,17 @@ class Importer:
         [1] Geisser, S., The predictive sample reuse method with applications, Journal
             of the American Statistical Association 70, 1975.
         """
+        campaign = self._read_campaign(paths, robots_folder, name)
+        if fold := test.get("fold"):
+            test = {"holdout": {"poses": _poses_of_fold(campaign.table, **fold)}}
+        held_out = {key: dict(value) for key, value in test.items()}
+        document = campaign.document | held_out
+        write_campaign(folder, document, campaign.table, campaign.joints)
+
+    def _read_campaign(
+        self, paths: Sequence[str | Path], robots_folder: str | Path, name: str
+    ) -> _ImportedCampaign:
+        """Read files as `write_campaign` gets them."""
         importers = self.parts or (self,)
         tables = []
         targets: list[str] = []
@@ -331,15 +357,11 @@ class Importer:
                 for target in targets
             },
             "compliance": "nominal",
-            # Without these no such data can be fitted at all.
-            "declared": ["joint_offset", "link_geometry"],
+            "declared": [*GEOMETRY],
         }
         if self.noise:
             document["noise"] = dict(self.noise)
-        if fold := test.get("fold"):
-            test = {"holdout": {"poses": _poses_of_fold(table, **fold)}}
-        document |= {key: dict(value) for key, value in test.items()}
-        write_campaign(folder, document, table, joints)
+        return _ImportedCampaign(document, table, joints)
 
     def _tabulate_session(
         self, session: int, measured: PublicMeasurements, robots_folder: str | Path
@@ -353,7 +375,7 @@ class Importer:
         return (
             {"session": np.full(len(rows), session)}
             | table
-            | _joint_table(angles[rows])
+            | name_joint_columns(angles[rows])
         )
 
 
@@ -368,22 +390,15 @@ class SocketImporter(Importer):
 
     distance_m: float = SOCKET_DISTANCE_M
 
-    def write_campaign(
-        self,
-        paths: Sequence[str | Path],
-        folder: str | Path,
-        robots_folder: str | Path,
-        name: str,
-        **test: Mapping[str, Any],
-    ) -> None:
-        """Write files of one robot as a campaign's folder, each folder of them as a
-        session; see `Importer.write_campaign`."""
+    def _read_campaign(
+        self, paths: Sequence[str | Path], robots_folder: str | Path, name: str
+    ) -> _ImportedCampaign:
+        """Read files of one robot, each folder of them as a session."""
         recordings = [read_recording(path) for path in paths]
         table = tabulate_recordings(recordings)
         joints = recordings[0].angles.shape[1]
         document = describe_sockets(name, self.robots[0], recordings, self.distance_m)
-        document |= {key: dict(value) for key, value in test.items()}
-        write_campaign(folder, document, table, joints)
+        return _ImportedCampaign(document, table, joints)
 
 
 def _tabulate(
@@ -403,14 +418,10 @@ def _tabulate(
         "load": np.zeros(len(rows), int),
         "repeat": repeat[rows],
         "target": np.tile(targets, len(pose)),
-        **_joint_table(measured.angles[rows]),
+        **name_joint_columns(measured.angles[rows]),
         **dict(zip("xyz", position.T, strict=True)),
         **measured.further,
     }
-
-
-def _joint_table(angles: np.ndarray) -> dict[str, np.ndarray]:
-    return {f"q{joint}": column for joint, column in enumerate(angles.T, 1)}
 
 
 def _poses_of_fold(

@@ -3,19 +3,15 @@ the workflow takes a copy."""
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from elastocal.campaigns.campaign import DOCUMENT
-from elastocal.campaigns.measurements import CSV, describe_columns
+from elastocal.campaigns.measurements import CSV, MOST_JOINTS, read_all_columns
 from elastocal.campaigns.writing import write_campaign
-from elastocal.errors import InputError
 from elastocal.io.documents import read_document
-from elastocal.io.records import compute_sha256
+from elastocal.io.records import refuse_other_contents
 
 
 def copy_included_campaign(
@@ -41,18 +37,8 @@ def copy_included_campaign(
         If the measurements have other contents than the digest says.
     """
     measurements = Path(source) / CSV
-    digest = compute_sha256(measurements)
-    if digest != sha256:
-        raise InputError(measurements, "", f"SHA-256 {digest}", sha256)
+    refuse_other_contents(measurements, sha256, sha256)
     document = read_document(Path(source) / DOCUMENT) | {"campaign": name}
     if holdout is not None:
         document["holdout"] = dict(holdout)
-    with open(measurements, encoding="utf-8", newline="") as file:
-        header, *rows = csv.reader(file)
-    joints = sum(name[:1] == "q" and name[1:].isdigit() for name in header)
-    kinds = describe_columns(joints)
-    table = {}
-    for name, texts in zip(header, zip(*rows, strict=True), strict=True):
-        kind = kinds[name].type
-        table[name] = np.array(texts, str if kind == "string" else kind)
-    write_campaign(folder, document, table, joints)
+    write_campaign(folder, document, read_all_columns(measurements), MOST_JOINTS)

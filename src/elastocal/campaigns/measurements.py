@@ -163,6 +163,50 @@ def _check_displayed_angles(table: Cells, joints: int) -> None:
             table.refuse(wrong, [displayed], allowed)
 
 
+def read_all_columns(path: Path) -> dict[str, np.ndarray]:
+    """Read every column of the format that a file of measurements has, with however many
+    joints."""
+    table = _read(path, MOST_JOINTS)
+    return {
+        name: convert_column(table, column)
+        for name, column in describe_columns(MOST_JOINTS).items()
+        if name in table.columns
+    }
+
+
+def convert_column(table: Cells, column: Column) -> np.ndarray:
+    """Convert a column (N,) of a table to texts, integers or numbers, as the format has
+    it."""
+    if column.type == "string":
+        return np.array(table.texts(column.name))
+    if column.type == "int32":
+        return table.integers(column.name)
+    return table.numbers(column.name)
+
+
+def name_joint_columns(angles: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the columns of joint angles (N, n) by their names."""
+    return {f"q{joint}": column for joint, column in enumerate(angles.T, 1)}
+
+
+def tabulate_single_measurements(
+    angles: np.ndarray, target: str
+) -> dict[str, np.ndarray]:
+    """Tabulate poses of the unloaded robot in which one target was measured once.
+
+    Returns the columns of the state and the target, one row for each pose, with joint
+    angles (N, n) as the controller reports them.
+    """
+    pose = np.arange(len(angles))
+    return {
+        "pose": pose,
+        "load": np.zeros_like(pose),
+        "repeat": np.zeros_like(pose),
+        "target": np.full(len(pose), target),
+        **name_joint_columns(angles),
+    }
+
+
 def read_measured_targets(folder: Path) -> tuple[list[str], str]:
     """Read which targets the measurements of a folder are of.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elastocal.campaigns.campaign import DOCUMENT
 from elastocal.campaigns.measurements import POSITION, ROTATION
 from elastocal.errors import suggest_names
 
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
     from elastocal.campaigns.tables import Cells
     from elastocal.measuring.channels import MeasuringPlan
     from elastocal.measuring.protocol import Kind
-
-_DOCUMENT = "campaign.yaml"
 
 
 def list_required_columns(plan: MeasuringPlan) -> list[str]:
@@ -160,7 +159,7 @@ def _find_feature(table: Cells, row: int, name: str, plan: MeasuringPlan) -> int
         return None
     names = [feature.name for feature in plan.features]
     if name not in names:
-        allowed = f"a feature of {_DOCUMENT}: {suggest_names(name, names)}"
+        allowed = f"a feature of {DOCUMENT}: {suggest_names(name, names)}"
         raise table.fault(row, "feature", allowed)
     return names.index(name)
 
@@ -179,10 +178,10 @@ def _find_kind(table: Cells, row: int, name: str, plan: MeasuringPlan) -> int:
     if name in names:
         return names.index(name)
     if "kind" in table.columns:
-        allowed = f"a kind of `measured` of {_DOCUMENT}: {', '.join(names)}"
+        allowed = f"a kind of `measured` of {DOCUMENT}: {', '.join(names)}"
         raise table.fault(row, "kind", allowed)
     features = ", ".join(feature.name for feature in plan.features)
-    raise table.fault(row, "feature", f"a feature of {_DOCUMENT}: {features}")
+    raise table.fault(row, "feature", f"a feature of {DOCUMENT}: {features}")
 
 
 def _check_feature(table: Cells, row: int, kind: Kind, implied: str) -> None:

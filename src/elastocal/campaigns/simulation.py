@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from elastocal.campaigns.measurements import name_joint_columns
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.elastostatics import (
     build_extended_chain,
@@ -78,8 +79,7 @@ def draw_measurements(
     measured = _add_noise(position, rotation, draws, plan)
     approaches = {"pose": pose, "load": load, "repeat": repeat}
     approaches |= dict(zip(WRENCH_NAMES, wrench.T, strict=True))
-    for joint, column in enumerate(robot.reported_angles(angles).T, 1):
-        approaches[f"q{joint}"] = column
+    approaches |= name_joint_columns(robot.reported_angles(angles))
     return _tabulate(approaches, plan.points, measured)
 
 

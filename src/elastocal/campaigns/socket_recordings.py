@@ -21,6 +21,8 @@ from typing import Any
 
 import numpy as np
 
+from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, GEOMETRY
+from elastocal.campaigns.measurements import tabulate_single_measurements
 from elastocal.errors import InputError
 
 # Distance of neighbouring sockets of the tool that MUKCa prints.
@@ -118,9 +120,9 @@ def describe_sockets(
         "targets": {TARGET: {"point": f"{joints}DoF", "offset_m": "unknown"}},
         "features": {name_socket(socket): {} for socket in sockets},
         "compliance": "nominal",
-        "declared": ["joint_offset", "link_geometry"],
+        "declared": [*GEOMETRY],
         "noise": {"position_m": SOCKET_STD_M},
-        "holdout": {"fraction": 0.3, "seed": 1},
+        "holdout": {**DEFAULT_HOLDOUT},
     }
     if len(sockets) == 2:
         distance = {
@@ -154,7 +156,7 @@ def tabulate_recordings(recordings: Sequence[Recording]) -> dict[str, np.ndarray
     columns: dict[str, list[np.ndarray]] = {"session": [], "feature": [], "angles": []}
     for recording in recordings:
         label = (recording.stand, recording.socket)
-        source = f"{recording.stand}/hole_{recording.socket}.csv"
+        source = f"{recording.stand}/{name_socket(recording.socket)}.csv"
         if recording.angles.shape[1] != joints:
             width = f"{recording.angles.shape[1]} angles in a line"
             raise InputError(source, "", width, f"{joints}, as in the first file")
@@ -165,14 +167,6 @@ def tabulate_recordings(recordings: Sequence[Recording]) -> dict[str, np.ndarray
         columns["session"].append(np.full(count, stands.index(recording.stand)))
         columns["feature"].append(np.full(count, name_socket(recording.socket)))
         columns["angles"].append(recording.angles)
-    angles = np.concatenate(columns["angles"])
-    poses = np.arange(len(angles))
-    table = {
-        "session": np.concatenate(columns["session"]),
-        "pose": poses,
-        "load": 0 * poses,
-        "repeat": 0 * poses,
-        "target": np.full(len(poses), TARGET),
-    }
-    table |= {f"q{joint}": column for joint, column in enumerate(angles.T, 1)}
-    return table | {"feature": np.concatenate(columns["feature"])}
+    table = {name: np.concatenate(arrays) for name, arrays in columns.items()}
+    angles = table.pop("angles")
+    return table | tabulate_single_measurements(angles, TARGET)

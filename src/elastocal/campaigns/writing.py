@@ -9,7 +9,12 @@ from typing import Any
 import numpy as np
 import yaml
 
-from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, DOCUMENT
+from elastocal.campaigns.campaign import (
+    DEFAULT_HOLDOUT,
+    DOCUMENT,
+    GEOMETRY,
+    ROBOT_FILE,
+)
 from elastocal.campaigns.measurements import (
     CSV,
     PARQUET,
@@ -18,7 +23,13 @@ from elastocal.campaigns.measurements import (
     write_measurements,
 )
 from elastocal.io.atomic_writes import write_text, write_together
-from elastocal.io.documents import check_document, format_one_line, read_schema
+from elastocal.io.documents import (
+    LARGEST_BYTES,
+    check_document,
+    format_one_line,
+    read_schema,
+)
+from elastocal.io.texts import read_text
 from elastocal.mechanics.robot import Robot
 
 
@@ -62,6 +73,14 @@ def write_campaign(
         write_text(partial / DOCUMENT, text)
 
 
+def copy_robot_file(robot_file: str | Path, folder: str | Path) -> None:
+    """Copy a robot file into the folder of a campaign, which is made if it does not
+    exist."""
+    text = read_text(robot_file, LARGEST_BYTES)
+    with write_together(folder, (ROBOT_FILE,)) as partial:
+        write_text(partial / ROBOT_FILE, text)
+
+
 def format_campaign_template(
     name: str, robot: Robot, targets: Sequence[str] = (), measured: str = "position"
 ) -> str:
@@ -77,7 +96,7 @@ def format_campaign_template(
     end_effector = robot.chain.end_effector.name
     document = {
         "campaign": name,
-        "robot": "robot.yaml",
+        "robot": ROBOT_FILE,
         "measured": measured,
         "frame": "tracker",
         "targets": {
@@ -85,7 +104,7 @@ def format_campaign_template(
             for target in targets or ("reflector",)
         },
         "compliance": "nominal" if robot.compliance_known else "identify",
-        "declared": ["joint_offset", "link_geometry"],
+        "declared": [*GEOMETRY],
         "holdout": DEFAULT_HOLDOUT,
     }
     schema = read_schema("campaign")

@@ -37,8 +37,6 @@ if TYPE_CHECKING:
 
 importing = typer.Typer(name="import", no_args_is_help=True)
 _Output = Annotated[Path, Option("--output", "-o", help="The robot file to write.")]
-# Robot file in the folder of a campaign.
-_ROBOT_FILE = "robot.yaml"
 # A printed tool is smaller; a larger number is in millimetres.
 _LARGEST_DISTANCE_M = 1.0
 _Force = Annotated[bool, Option("--force", help="Replace an existing file.")]
@@ -235,6 +233,7 @@ def csv(
     """
     from rich.console import Console
 
+    from elastocal.campaigns.campaign import ROBOT_FILE
     from elastocal.campaigns.measurements import CSV, write_measurements
     from elastocal.campaigns.reading import read_robot
     from elastocal.exchange.measurement_table import ImportOptions, OtherFile
@@ -278,7 +277,7 @@ def csv(
         )
     next_step = format_command("check", folder)
     if not declared_targets:
-        robot_file = robot_file or Path("robot.yaml")
+        robot_file = robot_file or Path(ROBOT_FILE)
         next_step = format_command("init", folder, "--robot", robot_file)
     print_lines([*lines, f"next: {next_step}"], Console())
 
@@ -309,6 +308,7 @@ def sockets(
     Each place of the tool is a session with a frame of its own. Files of poses that the
     controller computed, hole_0_pose.csv, are left aside.
     """
+    from elastocal.campaigns.campaign import ROBOT_FILE
     from elastocal.campaigns.socket_recordings import (
         describe_sockets,
         find_recordings,
@@ -321,7 +321,7 @@ def sockets(
     paths = find_recordings(recordings)
     files = [read_recording(path) for path in paths]
     table = tabulate_recordings(files)
-    document = describe_sockets(folder.resolve().name, _ROBOT_FILE, files, distance)
+    document = describe_sockets(folder.resolve().name, ROBOT_FILE, files, distance)
     stands = len({recording.stand for recording in files})
     size = (
         f"{format_count(len(table['pose']), 'pose')} in {format_count(len(paths), 'socket')}"
@@ -381,9 +381,10 @@ def board(
     arm = _read_robot_for(folder, robot, force=force)
     options = BoardOptions(joints, angles, lengths, sensor)
     poses = read_board_poses(file, arm, options)
-    table = tabulate_board_poses(poses, camera)
+    place = camera.replace("-", "_")
+    table = tabulate_board_poses(poses, place)
     document = describe_board_campaign(
-        folder.resolve().name, arm.joints, camera, poses.noise
+        folder.resolve().name, arm.joints, place, poses.noise
     )
     size = f"{format_count(len(table['pose']), 'pose')} of a board, camera {camera}"
     _write_campaign_folder(folder, document, table, arm.joints, robot, [size])
@@ -398,18 +399,18 @@ def _refuse_distance(distance: float) -> None:
 
 def _read_robot_for(folder: Path, robot: Path | None, *, force: bool) -> Robot:
     """Read the robot of a new campaign, and refuse a campaign that is there already."""
-    from elastocal.campaigns.campaign import DOCUMENT
+    from elastocal.campaigns.campaign import DOCUMENT, ROBOT_FILE
     from elastocal.campaigns.campaign_folder import check_campaign_name
     from elastocal.campaigns.reading import read_robot
     from elastocal.io.atomic_writes import check_places
 
     check_campaign_name(folder)
-    check_places(folder / DOCUMENT, folder / _ROBOT_FILE)
+    check_places(folder / DOCUMENT, folder / ROBOT_FILE)
     _check_replaceable(folder, force=force)
     if (folder / DOCUMENT).exists() and not force:
         problem = "a campaign that is there already"
         raise InputError(folder / DOCUMENT, "", problem, "another folder, or --force")
-    file = robot or folder / _ROBOT_FILE
+    file = robot or folder / ROBOT_FILE
     if not file.is_file():
         allowed = "--robot FILE; elastocal import urdf makes one"
         raise InputError(file, "", "no robot file", allowed)
@@ -427,14 +428,10 @@ def _write_campaign_folder(
     """Write a campaign with its robot file, and print what was read."""
     from rich.console import Console
 
-    from elastocal.campaigns.writing import write_campaign
-    from elastocal.io.atomic_writes import write_text
-    from elastocal.io.documents import LARGEST_BYTES
-    from elastocal.io.texts import read_text
+    from elastocal.campaigns.writing import copy_robot_file, write_campaign
 
     if robot is not None:
-        folder.mkdir(parents=True, exist_ok=True)
-        write_text(folder / _ROBOT_FILE, read_text(robot, LARGEST_BYTES))
+        copy_robot_file(robot, folder)
     write_campaign(folder, document, table, joints, kind="csv")
     next_step = format_command("check", folder)
     written = f"written: {folder.as_posix()}, campaign.yaml and measurements.csv"

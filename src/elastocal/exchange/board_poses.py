@@ -14,11 +14,15 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, GEOMETRY, ROBOT_FILE
+from elastocal.campaigns.measurements import (
+    POSITION,
+    ROTATION,
+    tabulate_single_measurements,
+)
 from elastocal.errors import InputError
+from elastocal.measuring.board import ON_ROBOT
 
-# Values of the option --camera.
-ON_ROBOT = "on-robot"
-BESIDE_ROBOT = "beside-robot"
 # Rotation matrices that are written with three decimals deviate by less.
 _LARGEST_DEVIATION = 5e-3
 # A camera that measures boards stands nearer; a larger distance is in millimetres.
@@ -89,22 +93,15 @@ def tabulate_board_poses(poses: BoardPoses, camera: str) -> dict[str, np.ndarray
     Parameters
     ----------
     poses : checked poses with joint angles.
-    camera : where the camera is, `ON_ROBOT` or `BESIDE_ROBOT`.
+    camera : where the camera is, as in ``campaign.yaml``.
     """
     if poses.angles is None:
         allowed = "--joints FILE: a table with q1, q2 and so on, a row for each sample"
         raise InputError(poses.source, "", "no joint angles", allowed)
-    number = np.arange(len(poses.position))
-    table = {
-        "pose": number,
-        "load": 0 * number,
-        "repeat": 0 * number,
-        "target": np.full(len(number), name_target(camera)),
-    }
-    table |= {f"q{joint}": angle for joint, angle in enumerate(poses.angles.T, 1)}
-    table |= dict(zip(("x", "y", "z"), poses.position.T, strict=True))
+    table = tabulate_single_measurements(poses.angles, name_target(camera))
+    table |= dict(zip(POSITION, poses.position.T, strict=True))
     vector = Rotation.from_matrix(poses.rotation).as_rotvec()
-    return table | dict(zip(("rx", "ry", "rz"), vector.T, strict=True))
+    return table | dict(zip(ROTATION, vector.T, strict=True))
 
 
 def describe_board_campaign(
@@ -116,21 +113,21 @@ def describe_board_campaign(
     ----------
     name : name of the campaign.
     joints : number of joints; camera or board sits behind the last one.
-    camera : where the camera is, `ON_ROBOT` or `BESIDE_ROBOT`.
+    camera : where the camera is, as in ``campaign.yaml``.
     noise : as in ``campaign.yaml``; None: `NOISE`.
     """
     mount = {"point": f"{joints}DoF", "offset_m": "unknown", "rotation": "unknown"}
     return {
         "campaign": name,
-        "robot": "robot.yaml",
+        "robot": ROBOT_FILE,
         "measured": "board",
-        "camera": camera.replace("-", "_"),
+        "camera": camera,
         "frame": "unknown",
         "targets": {name_target(camera): mount},
         "compliance": "nominal",
-        "declared": ["joint_offset", "link_geometry"],
+        "declared": [*GEOMETRY],
         "noise": dict(noise or NOISE),
-        "holdout": {"fraction": 0.3, "seed": 1},
+        "holdout": {**DEFAULT_HOLDOUT},
     }
 
 

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from elastocal.application.planning.survey import GEOMETRY
 from elastocal.campaigns import reading
-from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, UNKNOWN
+from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, GEOMETRY, UNKNOWN
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.holdout import split_poses
 from elastocal.campaigns.measurements import ROTATION, describe_columns
@@ -20,9 +19,7 @@ from elastocal.effects.catalogue import list_effects
 from elastocal.errors import InputError, suggest_names
 from elastocal.exchange.numbering import number_loads_and_repeats, number_poses
 from elastocal.fitting.cases import prepare_case
-from elastocal.fitting.model import (
-    Case,
-)
+from elastocal.fitting.model import Case
 from elastocal.interface.arrays import check_array
 from elastocal.io.documents import check_document
 from elastocal.loop.loading import (

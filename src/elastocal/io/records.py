@@ -219,6 +219,14 @@ def compute_sha256(path: str | Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
+def refuse_other_contents(path: str | Path, sha256: str, allowed: str) -> None:
+    """Refuse a file with another SHA-256 than the stated one: an InputError with
+    `allowed`."""
+    digest = compute_sha256(path)
+    if digest != sha256:
+        raise InputError(path, "", f"SHA-256 {digest}", allowed)
+
+
 def _digest_files(path: str, within: str | Path = "") -> dict[str, str]:
     """Return the SHA-256 of a file, or of all files below a folder. Hidden files are
     left out, because Snakemake writes the time to one."""

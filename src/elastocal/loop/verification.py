@@ -21,17 +21,18 @@ from elastocal.application.verification import (
     compute_measured_errors,
     list_verification_shortfalls,
 )
-from elastocal.campaigns.campaign import DOCUMENT, average_by_group
+from elastocal.campaigns.campaign import DOCUMENT, ROBOT_FILE, average_by_group
 from elastocal.campaigns.holdout import list_poses, number_configurations
 from elastocal.campaigns.measurements import (
     CONDITIONS,
     CSV,
     ROTATION,
+    convert_column,
     describe_columns,
     read_measurements,
 )
 from elastocal.campaigns.numbers import list_required_columns
-from elastocal.campaigns.writing import write_campaign
+from elastocal.campaigns.writing import copy_robot_file, write_campaign
 from elastocal.errors import InputError
 from elastocal.exchange.measured_targets import (
     CorrectedTargets,
@@ -39,10 +40,7 @@ from elastocal.exchange.measured_targets import (
     read_corrected_targets,
     read_target_measurements,
 )
-from elastocal.io.atomic_writes import write_text, write_together
-from elastocal.io.documents import LARGEST_BYTES
 from elastocal.io.records import compute_sha256
-from elastocal.io.texts import read_text
 from elastocal.loop.loading import read_described_campaign
 from elastocal.measuring.channels import parse_measuring
 from elastocal.mechanics.components import WRENCH_NAMES
@@ -62,8 +60,6 @@ if TYPE_CHECKING:
 
 # Name of the table that `elastocal correct` writes, beside the measurements.
 TARGETS = "targets.csv"
-# Robot file of a campaign whose robot is not one of the project's.
-_ROBOT = "robot.yaml"
 # End of the name of a campaign with the measurements of a verification.
 _ROUND = re.compile(r"(.+)_round(\d+)")
 # Largest relative difference of a stated error from that of the present diagnosis that
@@ -371,7 +367,7 @@ def list_round_files(folder: CampaignFolder, output: Path) -> list[Path]:
     """List the files that `join_measurements` writes."""
     names = [DOCUMENT, CSV]
     if not _is_named_robot(folder):
-        names.append(_ROBOT)
+        names.append(ROBOT_FILE)
     return [output / name for name in names]
 
 
@@ -432,10 +428,9 @@ def join_measurements(
             "compliance: identify, because these are the first measurements under load"
         )
     if not _is_named_robot(folder):
-        document["robot"] = _ROBOT
+        document["robot"] = ROBOT_FILE
         # The robot file comes first, because a folder with a campaign.yaml needs it.
-        with write_together(output, [_ROBOT]) as partial:
-            write_text(partial / _ROBOT, read_text(folder.robot_file, LARGEST_BYTES))
+        copy_robot_file(folder.robot_file, output)
     write_campaign(output, document, table, campaign.robot.commands, kind="csv")
     return remarks
 
@@ -446,16 +441,11 @@ def _read_columns(folder: CampaignFolder) -> dict[str, np.ndarray]:
     plan = parse_measuring(folder.document, folder.source)
     cells = read_measurements(folder.path, joints, list_required_columns(plan))
     unread = () if plan.has_orientations else ROTATION
-    columns: dict[str, np.ndarray] = {}
-    for name, column in describe_columns(joints).items():
-        if name not in cells.columns or name in unread:
-            continue
-        if column.type == "string":
-            columns[name] = np.array(cells.texts(name))
-        elif column.type == "int32":
-            columns[name] = cells.integers(name)
-        else:
-            columns[name] = cells.numbers(name)
+    columns = {
+        name: convert_column(cells, column)
+        for name, column in describe_columns(joints).items()
+        if name in cells.columns and name not in unread
+    }
     count = len(cells.rows)
     columns.setdefault("session", np.zeros(count, int))
     for name in WRENCH_NAMES:

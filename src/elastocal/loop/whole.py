@@ -24,9 +24,7 @@ from elastocal.diagnosis.judge import generate_residual_blocks, judge
 from elastocal.diagnosis.misplaced import find_misplaced_frames
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.cases import build_case
-from elastocal.fitting.model import (
-    Case,
-)
+from elastocal.fitting.model import Case
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import write_table

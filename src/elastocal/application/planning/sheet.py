@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from elastocal.application.planning.survey import GEOMETRY
+from elastocal.campaigns.campaign import GEOMETRY
 from elastocal.campaigns.measurements import DISPLAY_UNITS, TICK_COLUMN
 from elastocal.mechanics.components import WRENCH_NAMES
 

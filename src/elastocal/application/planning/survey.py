@@ -31,7 +31,7 @@ from elastocal.application.calibrated import (
 )
 from elastocal.application.frames import BASE, ROBOT, Scope, subtract_placement
 from elastocal.application.scope import is_offset_fitted
-from elastocal.campaigns.campaign import APPLICATION_POINT_STD_M
+from elastocal.campaigns.campaign import APPLICATION_POINT_STD_M, GEOMETRY
 from elastocal.effects.catalogue import declared_candidates
 from elastocal.effects.elastic import joint_compliance
 from elastocal.effects.gravity import declared_application_point, declared_weight
@@ -50,7 +50,6 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Target
     from elastocal.mechanics.robot import Robot
 
-GEOMETRY = ("joint_offset", "link_geometry")
 # States that are linearized at once, so that their Jacobians stay in the processor's
 # cache.
 _CHUNK = 1000
