@@ -77,8 +77,9 @@ def copy_robot_file(robot_file: str | Path, folder: str | Path) -> None:
     """Copy a robot file into the folder of a campaign, which is made if it does not
     exist."""
     text = read_text(robot_file, LARGEST_BYTES)
-    with write_together(folder, (ROBOT_FILE,)) as partial:
-        write_text(partial / ROBOT_FILE, text)
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    # The old file stays until the new one takes its name in one step.
+    write_text(Path(folder) / ROBOT_FILE, text)
 
 
 def format_campaign_template(
