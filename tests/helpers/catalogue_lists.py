@@ -20,7 +20,7 @@ METHOD = ROOT / "docs" / "method.md"
 # The table of sizes, between the lines that begin and end its fold on the page.
 SIZES = re.compile(r"(<details>.*?\n\n)(\|.*?\n)(\n</details>)", re.DOTALL)
 HEAD = (
-    "| effect, quantity | size | times | sign | at most | why |\n"
+    "| effect, quantity | reference size | times | sign | at most | reason |\n"
     "|---|---|---|---|---|---|\n"
 )
 
