@@ -1,10 +1,14 @@
 """Contacts are where they should be, and measurements have the errors of their instrument."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from elastocal_proof.plant.contacts import (
     Workshop,
+    find_view,
     read_gauge,
     read_length,
     seat_in_socket,
@@ -69,3 +73,33 @@ def test_a_board_is_less_certain_along_the_view_and_far_away(workshop):
 def test_what_is_out_of_reach_is_said(workshop):
     with pytest.raises(ValueError, match="does not reach"):
         seat_in_socket(workshop, np.array([9.0, 0.0, 0.0]), 0.0)
+
+
+def test_an_approximation_changes_the_start_and_not_the_contact(workshop):
+    rough = replace(workshop, approximate=lambda angles: locate(angles + 1e-3))
+    place = np.array([1.0, 0.5, 0.7])
+    seat = rough.find_tool(seat_in_socket(rough, place, 0.0))[0]
+    np.testing.assert_allclose(seat, place, atol=1e-10)
+
+
+def test_a_view_has_the_board_in_range_in_the_cone_and_not_oblique(workshop):
+    def look(angles):
+        """The same arm with a camera that looks along its forearm."""
+        turn, first, second = angles.T
+        turned = Rotation.from_euler(
+            "ZY", np.column_stack([turn, np.pi / 2 - first - second])
+        )
+        return locate(angles)[0], turned.as_matrix()
+
+    camera = replace(workshop, locate=look)
+    away = Rotation.from_euler("y", np.pi / 2).as_matrix()
+    board = np.array([2.2, 0.2, 0.5]), away
+    for _ in range(10):
+        position, rotation = camera.find_tool(find_view(camera, board))
+        sight = board[0] - position
+        distance = np.linalg.norm(sight)
+        assert 0.3 < distance < 0.9
+        assert sight @ rotation[:, 2] > distance * np.cos(0.35)
+        assert sight[0] > distance * np.cos(0.8)
+    with pytest.raises(ValueError, match="does not see"):
+        find_view(camera, (np.array([9.0, 0.0, 0.0]), away))

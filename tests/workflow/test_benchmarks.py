@@ -54,3 +54,9 @@ def test_the_cost_of_a_finished_run_is_stated(small_study, tmp_path):
     )
     cost = re.search(r"^\| blind case \| (\S+) \|", said, re.MULTILINE)
     assert float(cost[1]) > 0 and "from 12 and 24 data sets, 1 cases" in said
+
+
+def test_the_rates_of_an_instrument_are_stated_with_their_intervals():
+    printed = ended("instruments.py", 2, 1, "plane")
+    # One robot without an effect, which is right, and one with an effect.
+    assert "| plane | 0 of 1: 0.00 % (0.00-97.50) | 1 of 1" in printed

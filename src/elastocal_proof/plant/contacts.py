@@ -26,6 +26,8 @@ _MOST_STEPS = 60
 _CLOSE_M = 1e-11
 # Largest share of poses that may fail before the set-up counts as out of reach.
 _MOST_TRIALS_A_POSE = 40
+# Number of joint angles that are drawn at once in search of a view of a board.
+_VIEWS_AT_ONCE = 1000
 
 
 @dataclass(frozen=True)
@@ -37,11 +39,14 @@ class Workshop:
     locate : poses of the tool at joint angles.
     joint_limits : (n, 2) array, rad.
     draws : random numbers.
+    approximate : fast approximation of `locate`, with which contacts are sought first;
+        None if `locate` is fast itself.
     """
 
     locate: Locate
     joint_limits: np.ndarray
     draws: np.random.Generator
+    approximate: Locate | None = None
 
     def draw_angles(self) -> np.ndarray:
         """Draw joint angles (n,) uniformly within the limits."""
@@ -60,27 +65,31 @@ class Workshop:
         """
         low, high = self.joint_limits.T
         for _ in range(_MOST_TRIALS_A_POSE):
-            angles = self._approach(self.draw_angles(), height)
+            angles: np.ndarray | None = self.draw_angles()
+            if self.approximate is not None:
+                angles = _approach(self.approximate, angles, height)
+            if angles is not None:
+                angles = _approach(self.locate, angles, height)
             if angles is not None and ((angles >= low) & (angles <= high)).all():
                 return angles
         raise ValueError("the robot does not reach this contact within its limits")
 
-    def _approach(self, angles: np.ndarray, height: Height) -> np.ndarray | None:
-        """Newton's method with steps of least norm; None if it does not arrive."""
-        for _ in range(_MOST_STEPS):
-            steps = np.vstack([np.zeros(len(angles)), _STEP_RAD * np.eye(len(angles))])
-            heights = [
-                np.atleast_1d(height(position))
-                for position in self.locate(angles + steps)[0]
-            ]
-            distance = heights[0]
-            if np.abs(distance).max() < _CLOSE_M:
-                return angles
-            jacobian = (np.array(heights[1:]) - distance).T / _STEP_RAD
-            step = np.linalg.pinv(jacobian) @ distance
-            length = np.abs(step).max()
-            angles = angles - step * min(1.0, _LARGEST_STEP_RAD / max(length, 1e-12))
-        return None
+
+def _approach(locate: Locate, angles: np.ndarray, height: Height) -> np.ndarray | None:
+    """Newton's method with steps of least norm; None if it does not arrive."""
+    for _ in range(_MOST_STEPS):
+        steps = np.vstack([np.zeros(len(angles)), _STEP_RAD * np.eye(len(angles))])
+        heights = [
+            np.atleast_1d(height(position)) for position in locate(angles + steps)[0]
+        ]
+        distance = heights[0]
+        if np.abs(distance).max() < _CLOSE_M:
+            return angles
+        jacobian = (np.array(heights[1:]) - distance).T / _STEP_RAD
+        step = np.linalg.pinv(jacobian) @ distance
+        length = np.abs(step).max()
+        angles = angles - step * min(1.0, _LARGEST_STEP_RAD / max(length, 1e-12))
+    return None
 
 
 def seat_in_socket(workshop: Workshop, place: np.ndarray, play_m: float) -> np.ndarray:
@@ -121,6 +130,36 @@ def read_gauge(
     """Read a dial gauge along a unit axis (3,) on the tool, m."""
     along = workshop.find_tool(angles)[0] @ axis
     return float(along + noise_m * workshop.draws.standard_normal())
+
+
+def find_view(
+    workshop: Workshop,
+    board: tuple[np.ndarray, np.ndarray],
+    range_m: tuple[float, float] = (0.3, 0.9),
+    half_angle_rad: float = 0.35,
+    tilt_rad: float = 0.8,
+) -> np.ndarray:
+    """Draw joint angles (n,) at which a camera sees a board.
+
+    The camera is the tool and looks along its z; the board, (3,) m and (3, 3) in base
+    axes, is seen from the side to which its z does not point. The middle of the board is
+    within a range and an angle from the axis of the camera, its normal within an angle
+    from the line of sight.
+    """
+    for _ in range(_MOST_TRIALS_A_POSE):
+        angles = np.array([workshop.draw_angles() for _ in range(_VIEWS_AT_ONCE)])
+        position, rotation = workshop.locate(angles)
+        sight = board[0] - position
+        distance = np.linalg.norm(sight, axis=1)
+        is_in_range = (distance > range_m[0]) & (distance < range_m[1])
+        is_in_view = (sight * rotation[:, :, 2]).sum(axis=1) > distance * np.cos(
+            half_angle_rad
+        )
+        is_flat = sight @ board[1][:, 2] > distance * np.cos(tilt_rad)
+        seen = np.flatnonzero(is_in_range & is_in_view & is_flat)
+        if len(seen):
+            return np.asarray(angles[seen[0]])
+    raise ValueError("the camera does not see the board within the robot's limits")
 
 
 def see_board(
