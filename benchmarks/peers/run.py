@@ -168,7 +168,7 @@ def list_rows(folder: Path, data: Path) -> list[dict[str, str]]:
     models = {
         "geometry": "geometry",
         "geometry and effects": "effects",
-        "with a regression, as delivered": "delivered",
+        "as delivered": "delivered",
     }
     for model, step in models.items():
         name = f"elastocal {ec.__version__}"

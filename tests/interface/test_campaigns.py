@@ -38,6 +38,36 @@ def test_poses_and_repeats_are_counted_where_no_column_numbers_them(nominal, mea
     assert counted.repeat.max() == measured["repeat"].max()
 
 
+def shuffle_rows(*arrays):
+    order = np.random.default_rng(6).permutation(len(arrays[0]))
+    return [array[order] for array in arrays], order
+
+
+def test_numbers_of_poses_and_loads_do_not_depend_on_the_order_of_rows(nominal):
+    """Each pose has two loads and is approached twice, with a controller's jitter."""
+    draws = np.random.default_rng(5)
+    angles = np.repeat(draws.uniform(-1.0, 1.0, (20, nominal.joints)), 4, axis=0)
+    angles += 1e-4 * draws.uniform(-1.0, 1.0, angles.shape)
+    positions = draws.uniform(-1.0, 1.0, (len(angles), 3))
+    wrenches = np.zeros((len(angles), 6))
+    wrenches[::2, 2] = -100.0
+    campaign = ec.Campaign(
+        nominal, joint_angles=angles, positions=positions, wrenches=wrenches
+    )
+    shuffled, order = shuffle_rows(angles, positions, wrenches)
+    names = ("joint_angles", "positions", "wrenches")
+    again = ec.Campaign(nominal, **dict(zip(names, shuffled, strict=True)))
+    numbers = campaign.checked.measurements
+    for name in ("pose", "load", "repeat", "position"):
+        expected = getattr(numbers, name)[order]
+        np.testing.assert_array_equal(
+            getattr(again.checked.measurements, name), expected
+        )
+    assert len(np.unique(numbers.pose)) == 20
+    assert np.unique(numbers.load).tolist() == [0, 1]
+    assert np.unique(numbers.repeat).tolist() == [0, 1]
+
+
 def test_several_targets_make_a_row_each_but_for_missing_ones(nominal, measured):
     angles, positions = angles_and_positions(measured, nominal)
     two = np.stack([positions, positions + 0.05], axis=1)

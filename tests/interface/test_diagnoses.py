@@ -73,6 +73,28 @@ def test_progress_is_reported_in_lines(campaign):
     assert all("\n" not in line for line in lines)
 
 
+def test_the_order_of_rows_does_not_change_the_diagnosis(nominal, measured):
+    """Nothing has moved during these measurements, so that only rounding differs."""
+    target = {"reflector": {"point": "tool", "offset_m": [0, 0, 0], "offset_std_m": 0}}
+    settings = {"frame": "base", "declared": [], "targets": target}
+    plain = measured[[*REPORTED, *"xyz"]]
+    shuffled = plain.sample(frac=1.0, random_state=6)
+    results = [
+        ec.diagnose(ec.Campaign.from_table(nominal, table, **settings))
+        for table in (plain, shuffled)
+    ]
+    first, second = (
+        result.errors.set_index("step").select_dtypes("number") for result in results
+    )
+    pd.testing.assert_frame_equal(first, second, rtol=1e-6)
+    parts = [result.effects for result in results]
+    assert [effect.name for effect in parts[0]] == [effect.name for effect in parts[1]]
+    for first, second in zip(*parts, strict=True):
+        assert first.probability == pytest.approx(second.probability, rel=1e-6)
+        for one, other in zip(first.parameters, second.parameters, strict=True):
+            assert one.value == pytest.approx(other.value, rel=1e-6)
+
+
 @pytest.mark.slow
 def test_a_folder_gives_the_verdict_of_the_command(tmp_path):
     """The same campaign by `elastocal diagnose` and in memory."""

@@ -43,5 +43,5 @@ def test_five_lines_on_the_whole_grid_of_a_ur5_reach_the_stated_errors():
     assert f"| {physics_mm} " in tables
     for page in ("README.md", "docs/other_packages.md"):
         text = " ".join((ROOT / page).read_text("utf-8").split())
-        assert f"{delivered_mm} mm" in text, page
-        assert f"{physics_mm}" in text, page
+        assert delivered_mm in text, page
+        assert f"{physics_mm} mm" in text, page

@@ -95,7 +95,10 @@ class Campaign:
             Further columns (N,) with the names of measurements.csv: ``session``,
             ``pose``, ``load``, ``repeat``, ``target``, ``time_s``, ``temperature_c``,
             ``u95_m``, ``approach1`` and so on. Without them, rows of equal joint angles
-            are one pose, and equal loads of a pose its repeats.
+            are one pose, and equal loads of a pose its repeats. Poses are numbered by
+            their joint angles, so that the same poses are held out in any order of the
+            rows. Rows are taken to be in the order in which they were measured, because
+            the set-up may have moved between two of them.
         **settings
             Keys of campaign.yaml, such as ``targets``, ``frame`` ("tracker" by
             default), ``declared``, ``noise``, ``holdout``, ``remainder`` and
@@ -359,10 +362,34 @@ def _make_table(rows: _Rows, robot: Robot) -> Cells:
     ):
         headers |= {name: f"{argument}[{index}]" for index, name in enumerate(names)}
     cells = Cells(_SOURCE, _encode(rows.columns), rows.numbers, headers=headers)
-    numbers = number_poses(cells, cells.matrix(angles))
-    numbers["target"] = np.array(cells.texts("target"))
-    numbers |= number_loads_and_repeats(cells, rows.columns | numbers)
+    numbers = _number_rows(cells, rows, cells.matrix(angles))
     return replace(cells, columns=_encode({**rows.columns, **numbers}))
+
+
+def _number_rows(
+    cells: Cells, rows: _Rows, joint_angles: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Number poses, loads and repeats that no column states.
+
+    Draws of held-out poses and folds refer to these numbers. Poses and loads are
+    therefore numbered in the order of their joint angles and wrenches, which a
+    permutation of the rows does not change.
+
+    Parameters
+    ----------
+    cells, rows : the M measurements.
+    joint_angles : (M, n) array, rad.
+    """
+    wrenches = [rows.columns[name] for name in WRENCH_NAMES if name in rows.columns]
+    # numpy sorts by the last key first. Rows with equal keys are repeats.
+    order = np.lexsort([*reversed(wrenches), *reversed(joint_angles.T)])
+    columns = {name: column[order] for name, column in rows.columns.items()}
+    ordered = cells.select(order)
+    numbers = number_poses(ordered, joint_angles[order])
+    numbers["target"] = np.array(ordered.texts("target"))
+    numbers |= number_loads_and_repeats(ordered, columns | numbers)
+    place = np.argsort(order)
+    return {name: column[place] for name, column in numbers.items()}
 
 
 def _encode(columns: Mapping[str, np.ndarray]) -> dict[str, pa.ChunkedArray]:
