@@ -300,20 +300,29 @@ def _find_noncentrality(critical: float, dof: int) -> float:
 
 
 def find_remaining_error(
-    errors: MeasuredErrors, repeated_m: np.ndarray, sensor_m: np.ndarray
+    errors: MeasuredErrors,
+    repeated_m: np.ndarray,
+    sensor_m: np.ndarray,
+    noise_dof: int,
 ) -> RemainingError:
     """Test whether more than noise and repeatability remains of the errors.
+
+    The noise was estimated from few repeats, so that it may be larger than estimated.
+    Without this uncertainty, the test would find an error that repeats in far more than
+    5 % of the robots that have none.
 
     Parameters
     ----------
     errors : measured errors of N targets.
     repeated_m : (N,) RMS error of a target by the repeatability of the joints.
     sensor_m : (N,) standard deviation of the tracker's noise in a coordinate.
+    noise_dof : as of `draw_measured_rms`.
     """
     stream = np.random.default_rng(_SEED)
     variance = sensor_m**2 + repeated_m**2 / 3.0
     share = errors.degrees_of_freedom / errors.error.size
     drawn = stream.chisquare(3, (_DRAWS, len(variance))) @ variance * share
+    drawn *= _draw_noise_scale(stream, noise_dof)
     observed = float((errors.error**2).sum())
     p_value = float((1 + (drawn >= observed).sum()) / (1 + _DRAWS))
     by_chance = 3.0 * float(variance.mean())
@@ -325,6 +334,14 @@ def find_remaining_error(
         float(np.sqrt(beyond)),
         float(np.sqrt(by_chance)),
     )
+
+
+def _draw_noise_scale(stream: np.random.Generator, noise_dof: int) -> np.ndarray:
+    """Draw ratios (draws,) of the noise's variance to its estimate with `noise_dof`
+    degrees of freedom; ones if the noise is declared."""
+    if not noise_dof:
+        return np.ones(_DRAWS)
+    return noise_dof / stream.chisquare(noise_dof, _DRAWS)
 
 
 def draw_measured_rms(
@@ -365,9 +382,7 @@ def draw_measured_rms(
     scale = np.ones(_DRAWS)
     if np.isfinite(dof):
         scale = dof / stream.chisquare(dof, _DRAWS)
-    noise_scale = np.ones(_DRAWS)
-    if noise_dof:
-        noise_scale = noise_dof / stream.chisquare(noise_dof, _DRAWS)
+    noise_scale = _draw_noise_scale(stream, noise_dof)
     mean_square = total * scale - by_noise * noise_scale
     is_possible = mean_square > 0.0
     if is_possible.mean() < _FEWEST_POSSIBLE:
@@ -465,7 +480,7 @@ def compare_targets(
         subtracted_m,
         predict_errors(calibrated, targets.joint_angles, targets.wrench),
         check_prediction(errors, predicted_rms_m, targets.bound_m, sensor_m),
-        find_remaining_error(errors, repeated_m, sensor_m),
+        find_remaining_error(errors, repeated_m, sensor_m, noise.degrees_of_freedom),
         draw_measured_rms(
             errors, targets.configuration, subtracted_m, noise.degrees_of_freedom
         ),
