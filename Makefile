@@ -36,9 +36,9 @@ test-slow:
 	$(MAKE) test SLOW="all -m slow"
 
 # The profile for Slurm on a Slurm of this machine, which the tests start and stop; asks for root. It ends after ten minutes at the latest;
-# the daemons end with the tests, however those end.
+# the daemons end with the tests, however those end. The first failure ends it too, so that its cause is printed within this time.
 test-slurm: .venv/ready-for-tests
-	OMP_NUM_THREADS=1 ELASTOCAL_SLURM=1 timeout --kill-after=20 580 $(BIN)/python -m pytest -q -rs --slow all tests/workflow/test_slurm.py
+	OMP_NUM_THREADS=1 ELASTOCAL_SLURM=1 timeout --kill-after=20 580 $(BIN)/python -m pytest -q -rs -x --slow all tests/workflow/test_slurm.py
 
 # The tests of tests/fuzz with 90 times as many inputs, and others each time: 5 minutes.
 fuzz: .venv/ready-for-tests

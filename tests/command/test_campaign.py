@@ -149,10 +149,11 @@ def test_diagnose_runs_the_target_of_the_campaign_and_returns_its_exit_code(
 @pytest.mark.parametrize(
     "mark", ["{x}", "<x>", "'", '"', ": ", " #", "\n", "\x1b", "\u202e"]
 )
+@pytest.mark.parametrize("command", ["check", "diagnose"])
 def test_a_path_that_snakemake_takes_for_something_else_is_refused(
-    refusal, tmp_path, mark
+    refusal, tmp_path, mark, command
 ):
-    assert "a path without it" in refusal("diagnose", f"{tmp_path}/a{mark}b")
+    assert "a path without it" in refusal(command, f"{tmp_path}/a{mark}b")
 
 
 @pytest.mark.parametrize("name", ["cell'", "cell "])

@@ -25,6 +25,7 @@ from elastocal.exchange.measurement_table import read_measurement_table
         ("Axis_2_deg", "q2", "deg"),
         ("q[1]", "q1", None),
         ("J ( 6 )", "q6", None),
+        ("Actuator7", "q7", None),
         ("q[5] [deg]", "q5", "deg"),
         ("x_mm", "x", "mm"),
         ("Position Y [mm]", "y", "mm"),

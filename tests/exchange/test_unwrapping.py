@@ -26,6 +26,16 @@ def test_angles_counted_from_0_to_360_come_into_the_limits(tmp_path):
     assert len(notes) == 1 and "'Actuator1'" in notes[0] and "2 of 4 angles" in notes[0]
 
 
+def test_one_note_names_all_joints_that_were_moved():
+    robot = replace(ROBOT, joint_limits=np.radians([[-130.0, 130.0]] * 2))
+    reported = np.radians([[12.5, 350.0], [359.0, 20.0], [0.0, 340.0]])
+    angles, notes = unwrap_into_limits(reported, robot, ["Actuator1", "Actuator2"])
+    expected = [[12.5, -10.0], [-1.0, 20.0], [0.0, -20.0]]
+    np.testing.assert_allclose(np.degrees(angles), expected, atol=1e-9)
+    (note,) = notes
+    assert "'Actuator1', 'Actuator2'; 3 of 6 angles" in note
+
+
 def test_angles_counted_from_minus_180_come_into_limits_above(tmp_path):
     limits = np.radians([[10.0, 350.0], [-360.0, 360.0]])
     angles, _ = unwrap([-170.0, 20.0], replace(ROBOT, joint_limits=limits))
@@ -63,4 +73,4 @@ def test_a_joint_near_zero_stands_in_one_pose(tmp_path):
     imported = table(tmp_path, text, PLAIN, ROBOT)
     assert imported.table["pose"].tolist() == [1, 1]
     assert imported.table["repeat"].tolist() == [0, 1]
-    assert any("'J1' counts a turn" in note for note in imported.notes)
+    assert any("whatever the limits: 'J1'" in note for note in imported.notes)

@@ -169,17 +169,38 @@ def _wait(ready):
 
 
 def run_client(command, folder, environment):
-    """Run a command that uses Slurm; it ends with the tests."""
-    done = subprocess.run(
-        ["setpriv", "--pdeathsig", "KILL", *map(str, command)],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=ENDED_S,
+    """Run a command that uses Slurm; it ends with the tests.
+
+    If it fails or takes too long, the message has its output and the state of Slurm.
+    """
+    output = folder / "client.log"
+    with output.open("w", encoding="utf-8") as log:
+        process = subprocess.Popen(
+            ["setpriv", "--pdeathsig", "KILL", *map(str, command)],
+            cwd=folder,
+            env=environment,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+        )
+        try:
+            code = process.wait(ENDED_S)
+        except subprocess.TimeoutExpired:
+            code = f"none after {ENDED_S} s"
+            process.kill()
+            process.wait()
+    said = output.read_text(encoding="utf-8")
+    assert code == 0, f"exit code: {code}\n{said[-6000:]}\n{describe(environment)}"
+    return said
+
+
+def describe(environment):
+    """What Slurm says of its jobs and nodes."""
+    commands = (["squeue", "--long"], ["sinfo", "--Node", "--long"])
+    states = (
+        subprocess.run(command, env=environment, capture_output=True, text=True)
+        for command in commands
     )
-    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
-    return done.stdout + done.stderr
+    return "".join(state.stdout + state.stderr for state in states)
 
 
 def on_slurm(folder, environment, *arguments):

@@ -121,8 +121,11 @@ def check(folder: Annotated[Path, Argument(help="Folder of the campaign.")]) -> 
     """
     from rich.console import Console
 
+    from elastocal.campaigns.campaign_folder import check_workflow_path
     from elastocal.loop.overview import inspect_campaign
 
+    # The next command is `diagnose`, which refuses such a path.
+    check_workflow_path(str(folder.resolve()))
     report = inspect_campaign(folder, find_robots_folder())
     if report.diagnosable:
         testable = format_count(report.testable, "candidate effect")

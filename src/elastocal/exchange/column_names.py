@@ -59,7 +59,7 @@ _UNIT_AT_END = re.compile(r"(.+?)[_/ ]([A-Za-zµ°]+)")
 # Names of joint angles. A joint has at most two digits; a larger number does not belong
 # to a joint.
 _JOINT = re.compile(
-    r"(q|j|a|axis|joint|theta|jointangle|actualq|targetq|qactual|rax|jointpos|jointposition|jointpositions|joints)([0-9]{1,2})"
+    r"(q|j|a|axis|joint|actuator|theta|jointangle|actualq|targetq|qactual|rax|jointpos|jointposition|jointpositions|joints)([0-9]{1,2})"
 )
 _APPROACH = re.compile(r"(?:approach|direction)([0-9]{1,2})")
 # Names of columns by their simplified headers. Only options name Euler angles, because E1

@@ -40,22 +40,26 @@ def unwrap_into_limits(
     Returns
     -------
     angles : (N, n) joint angles.
-    notes : sentence for each joint that was moved.
+    notes : a sentence on all joints that were moved, if any.
     """
     angles = reported.copy()
-    notes = []
+    moved = []
     for joint, header in enumerate(headers):
         if robot.prismatic_commands[joint] or not _counts_alone(robot, joint):
             continue
         turns = _find_turns(reported, robot, joint)
         if turns.any():
             angles[:, joint] += _TURN_RAD * turns
-            notes.append(
-                f"{header!r} counts a turn whatever its limits:"
-                f" {format_integer(int(np.count_nonzero(turns)))} of {len(turns)} angles"
-                " became another by a turn, within the limits"
-            )
-    return angles, notes
+            moved.append(repr(header))
+    if not moved:
+        return angles, []
+    changed = format_integer(int(np.count_nonzero(angles != reported)))
+    counted = format_integer(len(moved) * len(angles))
+    note = (
+        f"counted over a turn whatever the limits: {', '.join(moved)}; {changed} of"
+        f" {counted} angles became another by a turn, within the limits"
+    )
+    return angles, [note]
 
 
 def _counts_alone(robot: Robot, joint: int) -> bool:
