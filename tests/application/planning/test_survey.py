@@ -82,6 +82,26 @@ def test_information_is_the_inverse_of_the_covariance_of_a_fit_with_priors(measu
     )
 
 
+def test_a_target_on_the_end_effector_moves_as_the_end_effector(survey):
+    """Under the full load, which is the second of three measurements, by every parameter
+    that a command contains."""
+    target = replace(survey.targets[0], offset_m=(0.0, 0.0, 0.0))
+    known = replace(survey, targets=(target,), unknown_base=False)
+    candidates = make_candidates(known, 20)
+    measured = compute_information_rows(
+        known, candidates.joint_angles, candidates.force
+    )
+    moved = compute_accuracy_rows(known, candidates.joint_angles, candidates.force)
+    owners = [owner for owner, _ in list_parameters(*declare_model(known))]
+    is_without_command = np.array(
+        [owner.startswith(("target", "declared_application_point")) for owner in owners]
+    )
+    assert is_without_command.sum() == 3
+    expected = known.position_m * measured[:, 3:6]
+    expected[..., is_without_command] = 0.0
+    np.testing.assert_allclose(moved, expected, atol=1e-9)
+
+
 @pytest.mark.parametrize("unknown_base", [True, False])
 def test_a_motion_of_the_base_is_an_error_only_if_the_base_is_known(unknown_base):
     survey = replace(make_survey(), unknown_base=unknown_base)

@@ -48,6 +48,7 @@ from elastocal.mechanics.sites import build_sites
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Target
+    from elastocal.effects.protocol import Parameter
     from elastocal.mechanics.robot import Robot
 
 # States that are linearized at once, so that their Jacobians stay in the processor's
@@ -259,7 +260,8 @@ def compute_accuracy_rows(
     """
     robot = survey.robot
     model, estimate = declare_model(survey)
-    count = len(list_parameters(model, estimate))
+    parameters = list_parameters(model, estimate)
+    count = len(parameters)
     calibrated = calibrate_by_model(
         robot,
         model,
@@ -282,9 +284,17 @@ def compute_accuracy_rows(
     plausible = np.array([parameter.plausible for _, parameter in commanded])
     residual = subtract_placement(scope, position, rotation, sensitivities * plausible)
     rows = np.zeros((len(sensitivities), 3, count))
-    # The parameters of base and targets come first.
-    rows[..., -len(plausible) :] = residual[:, :3]
+    rows[..., _find_commanded(parameters, commanded)] = residual[:, :3]
     return rows
+
+
+def _find_commanded(
+    parameters: list[tuple[str, Parameter]], commanded: list[tuple[str, Parameter]]
+) -> np.ndarray:
+    """Find which parameters (P,) commands contain. They contain neither the placement of
+    base and targets nor the point of the load."""
+    effects = {owner for owner, _ in commanded}
+    return np.array([owner in effects for owner, _ in parameters])
 
 
 def build_observations(
