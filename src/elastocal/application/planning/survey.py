@@ -261,12 +261,11 @@ def compute_accuracy_rows(
     robot = survey.robot
     model, estimate = declare_model(survey)
     parameters = list_parameters(model, estimate)
-    count = len(parameters)
     calibrated = calibrate_by_model(
         robot,
         model,
         estimate,
-        np.zeros((count, count)),
+        np.zeros((len(parameters), len(parameters))),
         Noise(
             "declared",
             survey.position_m,
@@ -283,7 +282,7 @@ def compute_accuracy_rows(
     commanded = list_parameters(calibrated.model, calibrated.estimate)
     plausible = np.array([parameter.plausible for _, parameter in commanded])
     residual = subtract_placement(scope, position, rotation, sensitivities * plausible)
-    rows = np.zeros((len(sensitivities), 3, count))
+    rows = np.zeros((len(sensitivities), 3, len(parameters)))
     rows[..., _find_commanded(parameters, commanded)] = residual[:, :3]
     return rows
 
