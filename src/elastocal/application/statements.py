@@ -32,21 +32,21 @@ def format_accuracy(accuracy: Accuracy) -> str:
     worst = _format_bounded(accuracy, accuracy.worst_m, accuracy.worst_bound_m)
     text = (
         f"Predicted position error of the corrected robot {frame}: {rms} RMS over"
-        f" {accuracy.region} ({accuracy.poses}), {worst} at the worst of them;"
-        " the tracker's noise is not in it."
+        f" {accuracy.region} ({accuracy.poses}), {worst} at the worst of them,"
+        " without the tracker's noise."
     )
     if accuracy.left_out:
         effects = list_effects()
         names = ", ".join(effects[effect_of(key)].words for key in accuracy.left_out)
         size = format_millimetres(accuracy.left_out_m)
-        text += f" {size} of it stand for {names}, which no command contains."
+        text += f" {size} of it are due to {names}, which commands cannot correct."
     # Do not mention a contribution that rounds to nothing.
     if round(accuracy.form_m, 6):
         size = format_millimetres(accuracy.form_m)
-        reason = "other models fit as well"
+        reason = "other models fit equally well"
         if accuracy.contradicted:
-            reason = "validation poses were missed by more than the fit says"
-        text += f" {size} of it stand for the form of the model: {reason}."
+            reason = "validation poses deviate more than the fit predicts"
+        text += f" {size} of it are model-form uncertainty: {reason}."
     return text
 
 

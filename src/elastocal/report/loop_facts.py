@@ -51,7 +51,6 @@ _LISTS = (
     "headline",
     "accuracy",
     "noise",
-    "settings",
     "method",
 )
 # Causes and locations below this probability are not shown.
