@@ -115,6 +115,19 @@ def find_distributions(names):
     return found
 
 
+def find_base_distributions():
+    """Return the distributions that the wheel requires without an extra, by name."""
+    required = map(Requirement, PROJECT["dependencies"])
+    return find_distributions([requirement.name for requirement in required])
+
+
+def measure_mb(distribution):
+    """Return what a distribution takes of the disk without bytecode, MB."""
+    paths = map(distribution.locate_file, distribution.files)
+    kept = (path for path in paths if path.suffix != ".pyc" and path.is_file())
+    return 1e-6 * sum(path.stat().st_size for path in kept)
+
+
 @pytest.fixture(scope="module")
 def base(wheel, tmp_path_factory):
     """An environment with the wheel and its base requirements: links to the packages of
@@ -122,9 +135,7 @@ def base(wheel, tmp_path_factory):
     folder = tmp_path_factory.mktemp("base")
     venv.create(folder, symlinks=True, with_pip=False)
     packages = Path(sysconfig.get_path("purelib", "venv", {"base": folder}))
-    required = map(Requirement, PROJECT["dependencies"])
-    names = [requirement.name for requirement in required]
-    for distribution in find_distributions(names).values():
+    for distribution in find_base_distributions().values():
         for entry in {file.parts[0] for file in distribution.files} - {".."}:
             link = packages / entry
             if not link.exists():
@@ -227,6 +238,26 @@ def test_base_requirements_suffice_from_arrays_to_corrected_targets(base):
     *_, last = done.stdout.splitlines()
     assert last == f"not installed: {' '.join(EXTRAS)}"
     assert "gear transmission error" in done.stdout
+
+
+@pytest.mark.slow
+def test_the_page_says_how_much_an_installation_takes(wheel):
+    """With the pinned versions, in which the environment of these tests has them."""
+    page = (ROOT / "docs" / "how_to" / "use_from_python.md").read_text("utf-8")
+    sizes_mb = {
+        name: measure_mb(distribution)
+        for name, distribution in find_base_distributions().items()
+    }
+    with zipfile.ZipFile(wheel) as archive:
+        own_mb = 1e-6 * sum(member.file_size for member in archive.infolist())
+    assert f"and {sum(sizes_mb.values()) + own_mb:.0f} MB on disk" in page
+    largest = (
+        f"pyarrow {sizes_mb['pyarrow']:.0f} MB,"
+        f" numpy and scipy {sizes_mb['numpy'] + sizes_mb['scipy']:.0f} MB,"
+        f" pandas {sizes_mb['pandas']:.0f} MB,"
+        f" scikit-learn {sizes_mb['scikit-learn']:.0f} MB"
+    )
+    assert largest in " ".join(page.split())
 
 
 @pytest.mark.slow
