@@ -87,11 +87,11 @@ def draw(page: Path) -> None:
                 ms=4,
                 label=name,
             )
-        axis.axhline(95, color="black", lw=0.8, ls=":")
+        axis.axhline(95, color="black", lw=0.8, ls=":", label="nominal: 95 %")
         axis.set(title=_TITLES[kind], xlabel="held-out poses", xticks=POSES)
     axes[0, 0].set_ylabel("intervals with\nthe true value (%)")
     figure.legend(
-        *axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3
+        *axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4
     )
     figure.savefig(page.with_suffix(".png"), metadata={"Software": None}, dpi=150)
 

@@ -77,12 +77,13 @@ def test_views_show_boxes_tracker_and_both_kinds_of_poses():
     assert [axis.get_title() for axis in figure.axes] == [
         "from above",
         "from the side",
-        "what each pose is worth",
+        "accuracy by number of poses",
     ]
     labels = legend_entries(figure)
-    assert labels == ["to fit", "held out", "kept out of", "tracker", "base"]
+    curves = ["random poses, median and 5 to 95 %", "this plan"]
+    assert labels == ["to fit", "held out", "excluded", "tracker", "base", *curves]
     bare = draw_plan(survey.robot, OPEN, plan)
-    assert legend_entries(bare) == ["to fit", "held out", "base"]
+    assert legend_entries(bare) == ["to fit", "held out", "base", *curves]
     last = figure.axes[2].lines[-1].get_ydata()[-1]
     np.testing.assert_allclose(last, 1e3 * plan.accuracy_m[-1])
 

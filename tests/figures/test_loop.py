@@ -243,6 +243,23 @@ def test_leading_hypotheses_have_their_bars_and_all_others_have_one_together():
     assert [bar.get_width() for bar in axis.patches] == pytest.approx([10] * 8 + [20])
 
 
+def test_a_candidate_is_outlined_whatever_its_shape_in_the_most_probable_model():
+    table = candidate_table(count=3, chosen=0)
+    # The most probable model has the first candidate in a shape that fits worse alone.
+    table["candidate"][2] = table["candidate"][0]
+    table["chosen"][2] = True
+    figure = draw_probabilities(stated(), table)
+    factors = figure.axes[1]
+    outlines = [bar for bar in factors.patches if bar.get_gid() == "chosen"]
+    assert [bar.get_width() for bar in outlines] == [table["log_bayes_factor"][0]]
+    assert "in the most probable model" in legend_entries(figure)
+
+
+def test_ticks_of_a_square_root_axis_are_round_numbers():
+    axis = draw_probabilities(stated(), candidate_table()).axes[1]
+    assert axis.get_xticks().tolist() == [0, 2, 10, 20, 50, 100]
+
+
 def test_a_figure_states_that_no_candidate_can_be_tested():
     figure = draw_probabilities(stated([({}, 1.0)]), candidate_table(count=0, chosen=0))
     assert texts(figure) == [

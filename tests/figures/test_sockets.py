@@ -27,7 +27,7 @@ def test_held_out_points_are_drawn_and_the_errors_are_those_of_the_verdict():
     _, before, after = figure.axes[:3]
     assert before.get_title() == "before: 8.7 mm RMS"
     assert after.get_title() == "after: 0.34 mm RMS"
-    assert before.get_xlabel() == "x in mm, 19 held-out poses"
+    assert before.get_xlabel() == "x (mm), 19 held-out poses"
     drawn = before.get_lines()[-1].get_xydata()
     kept = held_out & ~gross_error
     expected = np.column_stack([columns["before_dx"], columns["before_dz"]])[kept]

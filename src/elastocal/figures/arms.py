@@ -14,6 +14,7 @@ from elastocal.figures.style import (
     MILLI,
     PALETTE,
     STAGES,
+    add_legend_below,
     create_panels,
     label_decades,
     styled,
@@ -189,8 +190,7 @@ def draw_plan(robot: Robot, cell: Cell, plan: Plan) -> Figure:
             shown = max(reach, float(np.abs(cell.tracker_m).max()))
         axis.set(xlim=(-1.1 * reach, 1.1 * shown), ylim=(-1.1 * reach, 1.1 * reach))
     _draw_accuracy(axes[0, 2], plan)
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower left", ncols=5)
+    add_legend_below(figure, 4)
     return figure
 
 
@@ -227,7 +227,7 @@ def _draw_cell(axis: Axes, cell: Cell, view: tuple[int, int]) -> None:
             (box[right, 0], box[up, 0]),
             size[right],
             size[up],
-            label="kept out of" if number == 0 else None,
+            label="excluded" if number == 0 else None,
             facecolor="#f2d7c9",
             edgecolor=PALETTE[1],
             lw=0.6,
@@ -245,20 +245,20 @@ def _draw_accuracy(axis: Axes, plan: Plan) -> None:
     count = np.arange(1, len(plan.accuracy_m) + 1)
     low, median, high = MILLI * np.quantile(plan.random_m, [0.05, 0.5, 0.95], axis=0)
     axis.fill_between(count, low, high, color=PALETTE[1], alpha=0.2, lw=0)
-    axis.plot(count, median, color=PALETTE[1], label="random poses, 5 to 95 %")
+    axis.plot(
+        count, median, color=PALETTE[1], label="random poses, median and 5 to 95 %"
+    )
     axis.plot(count, MILLI * plan.accuracy_m, color=PALETTE[0], label="this plan")
     final = MILLI * plan.accuracy_m[-1]
     axis.set(
         ylim=(0.5 * final, _MAX_ERROR_RATIO * final),
         yscale="log",
-        title="what each pose is worth",
+        title="accuracy by number of poses",
         xlabel="poses",
-        ylabel="position error left, RMS (mm)",
+        ylabel="predicted RMS position error (mm)",
     )
     label_decades(axis.yaxis)
     axis.xaxis.set_major_locator(MaxNLocator(integer=True))
-    # The curves fill the panel, so the legend goes below the axis.
-    axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2))
 
 
 @dataclass(frozen=True)

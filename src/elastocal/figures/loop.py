@@ -333,7 +333,7 @@ def draw_before_after(
         draw_model_errors(axis, steps, metric, noise_floor_m)
     handles = _explain_model_bars({step["kind"] for step in steps})
     if noise_floor_m:
-        label = "RMS that noise alone leaves"
+        label = "RMS of the noise alone"
         handles.append(Line2D([], [], label=label, **_NOISE_STYLE))
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
@@ -511,9 +511,7 @@ def draw_probabilities(posterior: Probabilities | None, table: Columns) -> Figur
     candidate_count = len(set(table["candidate"]))
     if posterior is None or not len(ranked):
         if candidate_count and set(table["note"]) == {_AT_FAULT}:
-            return draw_note(
-                "The data are at fault: no cause in the robot was looked for."
-            )
+            return draw_note("The data are at fault: no cause in the robot was tested.")
         return draw_note(
             f"None of {candidate_count} candidate causes can be tested with these "
             "measurements."
@@ -534,7 +532,7 @@ def draw_probabilities(posterior: Probabilities | None, table: Columns) -> Figur
         for family, colour in FAMILY_COLOURS.items()
         if family in families
     ]
-    if table["chosen"].any():
+    if _find_chosen(table, shown).any():
         handles.append(Patch(label="in the most probable model", **_CHOSEN_STYLE))
     title = (
         f"{len(ranked)} candidate causes tested; {candidate_count - len(ranked)} more "
@@ -587,7 +585,7 @@ def _draw_hypotheses(
     axis.set(
         xlim=(0, 112), xticks=range(0, 101, 20), xlabel="posterior probability (%)"
     )
-    axis.set_title("What is missing in the declared model", loc="left")
+    axis.set_title("Effects that the declared model lacks", loc="left")
 
 
 def _draw_factors(
@@ -595,7 +593,7 @@ def _draw_factors(
 ) -> None:
     """Draw the Bayes factors of single candidates, coloured by family."""
     factors = table["log_bayes_factor"][shown]
-    chosen = table["chosen"][shown].astype(bool)
+    chosen = _find_chosen(table, shown)
     colours = [
         FAMILY_COLOURS.get(family, PALETTE[-1]) for family in table["family"][shown]
     ]
@@ -621,9 +619,16 @@ def _draw_factors(
     axis.set_title("Each candidate cause alone", loc="left")
 
 
+def _find_chosen(table: Columns, shown: np.ndarray) -> np.ndarray:
+    """Find the shown candidates that the most probable model contains, whatever the
+    value of their shape parameter there: (shown,) array of bool."""
+    names = table["candidate"].astype(str)
+    return np.isin(names[shown], names[table["chosen"].astype(bool)])
+
+
 def _set_square_root_scale(axis: Axes, low: float, high: float) -> None:
     """Scale the x axis by square roots, which keep small values visible beside large
-    ones; negative values are mirrored. The ticks are squares of evenly spaced roots."""
+    ones; negative values are mirrored. The ticks are about evenly spaced."""
     axis.set_xscale(
         "function",
         functions=(
@@ -632,9 +637,19 @@ def _set_square_root_scale(axis: Axes, low: float, high: float) -> None:
         ),
     )
     roots = np.linspace(-np.sqrt(-low), np.sqrt(high), 7)
-    ticks = {float(f"{root * abs(root):.2g}") for root in roots} | {0.0}
+    ticks = {_round_to_tick(root * abs(root)) for root in roots} | {0.0}
     axis.set_xticks(sorted(tick for tick in ticks if low <= tick <= high))
     axis.xaxis.set_major_formatter("{x:g}")
+
+
+def _round_to_tick(value: float) -> float:
+    """Round a value to 1, 2 or 5 times a power of ten, by its logarithm."""
+    if value == 0.0:
+        return 0.0
+    decade = 10.0 ** np.floor(np.log10(abs(value)))
+    factors = np.array([1.0, 2.0, 5.0, 10.0])
+    nearest = np.argmin(np.abs(np.log(abs(value) / (factors * decade))))
+    return float(np.sign(value) * factors[nearest] * decade)
 
 
 def _compute_row_heights(labels: Sequence[str]) -> np.ndarray:

@@ -53,11 +53,11 @@ def draw_sockets(residuals: Columns, heldout: HeldOut) -> Figure:
         points = _get_points_mm(residuals, stage, rows)
         _draw_points(axis, points, colour, 1.05 * limit)
         axis.set_title(f"{stage}: {MILLI * rms_m:.3g} mm RMS")
-        axis.set_xlabel(f"x in mm, {poses} held-out poses")
-    before.set_ylabel("ball from its socket, z in mm")
+        axis.set_xlabel(f"x (mm), {poses} held-out poses")
+    before.set_ylabel("ball from its socket, z (mm)")
     inset = after.inset_axes(_INSET)
     _draw_points(inset, points, colour, _ENLARGED_MM)
-    inset.tick_params(labelsize=5)
+    inset.tick_params(labelsize=6)
     return figure
 
 

@@ -51,7 +51,7 @@ _DESIGN_LABELS = {
     "I": "I-optimal",
 }
 _STUDIES_LABEL = "further studies, median and central 95 %"
-_UNSEEN_LABEL = "values that would not differ in the test of all figures"
+_UNSEEN_LABEL = "values that the joint test would not reject"
 _DIAMOND: dict[str, Any] = {
     "marker": "D",
     "linestyle": "",
@@ -223,8 +223,8 @@ def draw_noise_impact(
     axes[0, 0].set_ylabel("dev, equation 15 (µm)")
     axes[1, 0].set_ylabel("the same, linear (µm)")
     legend_title = (
-        "noise (µm and µrad); bands: one standard error, as a factor; "
-        "thin: some ĉ ≤ 0, or ĉ scatters by over a quarter"
+        "noise (µm and µrad); bands: one Monte Carlo standard error, as a factor\n"
+        "thin lines: a compliance ĉ ≤ 0 occurs, or one scatters by over a quarter"
     )
     add_legend_below(figure, 5, legend_title)
     return figure
@@ -377,8 +377,8 @@ def _draw_scatter(axis: Axes, cells: pd.DataFrame, rows: np.ndarray) -> None:
         )
     differs = (cells.p_corrected < SIGNIFICANCE_LEVEL).to_numpy()
     for selected, color, label in (
-        (~differs, "#bdbdbd", "paper, does not differ"),
-        (differs, PALETTE[1], "paper, differs"),
+        (~differs, "#bdbdbd", "paper, no significant difference"),
+        (differs, PALETTE[1], "paper, significant difference"),
     ):
         axis.plot(
             cells.paper[selected], rows[selected], color=color, label=label, **_DIAMOND
@@ -387,8 +387,8 @@ def _draw_scatter(axis: Axes, cells: pd.DataFrame, rows: np.ndarray) -> None:
 
 @styled
 def draw_multiverse(table: pd.DataFrame) -> Figure:
-    """Draw how far the printed figures lie from ours and from those of each
-    interpretation the other way, by the quantity.
+    """Draw the ratio of the printed figures to ours, with each interpretation and with
+    its alternative, by the quantity.
 
     Parameters
     ----------
@@ -409,8 +409,8 @@ def draw_multiverse(table: pd.DataFrame) -> Figure:
         ).reindex(numbers)
         rows = range(len(numbers))
         axis.hlines(rows, factors.ours, factors.other, color="#9a9a9a", linewidth=0.8)
-        axis.plot(factors.ours, rows, "o", color=PALETTE[0], label="as we read it")
-        axis.plot(factors.other, rows, "D", color=PALETTE[1], label="the other way")
+        axis.plot(factors.ours, rows, "o", color=PALETTE[0], label="our interpretation")
+        axis.plot(factors.other, rows, "D", color=PALETTE[1], label="alternative")
         axis.set(title=title, xscale="log", ylim=(len(numbers) - 0.5, -0.5))
         largest = max(3.0, float(np.nanmax(factors.to_numpy())))
         # The margin is a share of the logarithm, so that no diamond is cut at the edge.
@@ -422,7 +422,7 @@ def draw_multiverse(table: pd.DataFrame) -> Figure:
         axis.grid(visible=False, axis="y")
     axes[0, 0].set_yticks(range(len(numbers)), labels=numbers)
     add_legend_below(
-        figure, 2, "factor between the printed figures and those of the study, median"
+        figure, 2, "factor between the printed figures and ours (at least 1), median"
     )
     return figure
 

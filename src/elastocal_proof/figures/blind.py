@@ -161,7 +161,9 @@ def draw_reliability(reliability: pd.DataFrame) -> Figure:
     figure, axes = create_panels(2, 1, 118, height_ratios=(3, 1), sharex=True)
     shares = axes[0, 0]
     counts = axes[1, 0]
-    shares.plot([0, 1], [0, 1], color="black", linewidth=0.8, linestyle=":")
+    shares.plot(
+        [0, 1], [0, 1], color="black", linewidth=0.8, linestyle=":", label="ideal"
+    )
     shares.errorbar(
         rows.stated,
         rows.rate,
@@ -170,7 +172,9 @@ def draw_reliability(reliability: pd.DataFrame) -> Figure:
         marker="o",
         markersize=4.5,
         linewidth=1.2,
+        label="verdicts, with 95 % intervals",
     )
+    shares.legend(loc="upper left")
     width = rows["to"] - rows["from"]
     counts.bar(
         rows["from"] + 0.1 * width, rows.cases, 0.8 * width, align="edge", color=_COLOR

@@ -68,7 +68,7 @@ def draw_method_errors(table: pd.DataFrame, methods: Mapping[str, Method]) -> Fi
         _draw_ratios(axis, table[table["split"] == split], names, methods)
         axis.set_title(_SPLITS[split])
     figure.supxlabel(
-        "RMS error on poses not seen, over that of geometry alone"
+        "RMS error at held-out poses, divided by that of geometry alone"
         " (95 % intervals over poses)",
         fontsize=8,
     )
@@ -206,7 +206,7 @@ def tabulate_league(job: Any) -> None:
     write_text(output.page, page)
     for name, file in params.missing.items():
         print(
-            f"left out of the league: {name}, as {file} is missing in ELASTOCAL_DATA",
+            f"left out of the benchmark: {name}, because ELASTOCAL_DATA lacks {file}",
             file=sys.stderr,
         )
     errors = draw_method_errors(table, methods)
