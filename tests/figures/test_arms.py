@@ -77,7 +77,7 @@ def test_views_show_boxes_tracker_and_both_kinds_of_poses():
     assert [axis.get_title() for axis in figure.axes] == [
         "from above",
         "from the side",
-        "accuracy by number of poses",
+        "predicted accuracy",
     ]
     labels = legend_entries(figure)
     curves = ["random poses, median and 5 to 95 %", "this plan"]

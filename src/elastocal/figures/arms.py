@@ -253,9 +253,9 @@ def _draw_accuracy(axis: Axes, plan: Plan) -> None:
     axis.set(
         ylim=(0.5 * final, _MAX_ERROR_RATIO * final),
         yscale="log",
-        title="accuracy by number of poses",
-        xlabel="poses",
-        ylabel="predicted RMS position error (mm)",
+        title="predicted accuracy",
+        xlabel="fitted poses",
+        ylabel="RMS position error (mm)",
     )
     label_decades(axis.yaxis)
     axis.xaxis.set_major_locator(MaxNLocator(integer=True))
