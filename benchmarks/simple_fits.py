@@ -2,11 +2,14 @@
 
 `python benchmarks/simple_fits.py FOLDER...` cross-validates each campaign by five folds
 of whole poses, and prints held-out RMS errors of the declared model as the diagnosis
-first fits it; of the same fit under the noise of measurements and poses that it leaves,
-which is kept if no effect is adopted; of least squares on a minimal set of parameters,
-by QR with column pivoting; and of ridge regression whose penalty inner folds choose.
-Ratios to the better of the two simple fits have 95 % intervals, from a bootstrap over
-poses. `--seed` draws other folds.
+first fits it; of the same fit under the noise that it leaves, shared out between sensor,
+joints and poses, and all of it from the sensor; of the one of these two that left-out
+poses choose, which is kept if no effect is adopted; of
+least squares on a minimal set of parameters, by QR with column pivoting; and of ridge
+regression whose penalty inner folds choose. Ratios to the better of the two simple fits
+have 95 % intervals, from a bootstrap over poses. `--seed` draws other folds.
+`--held-out` judges our fits by the held-out poses of the campaigns instead, which may
+be another campaign.
 """
 
 import argparse
@@ -16,8 +19,9 @@ import numpy as np
 from common import ROOT
 from scipy.linalg import qr
 
+from elastocal.diagnosis.adoption import choose_kept_fit
 from elastocal.diagnosis.candidate_design import build_candidate_design
-from elastocal.diagnosis.refit import estimate_residual_noise
+from elastocal.diagnosis.refit import estimate_residual_noise, estimate_sensor_noise
 from elastocal.diagnosis.search import screen_terms
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.protocol import Candidate
@@ -33,13 +37,19 @@ from elastocal.fitting.noise import Noise, estimate_noise, fit_declared_model
 from elastocal.fitting.observations import Observations, index_poses, select_states
 from elastocal.loop.whole import read_cases
 from elastocal.validation.held_out import compute_position_residuals
+from elastocal.validation.transfer import place_unseen_sessions, transfer_fit
 
 FOLDS = 5
 REPLICATES = 2000
 # Diagonal of R over the first one, below which a column is not identifiable.
 PIVOT_TOLERANCE = 1e-2
 PENALTIES = np.geomspace(1e-9, 1.0, 19)
-OURS = ("declared fit", "under the noise that it leaves")
+OURS = (
+    "declared fit",
+    "under the noise that it leaves",
+    "all of it from the sensor",
+    "chosen by left-out poses",
+)
 SIMPLE = ("minimal least squares", "ridge")
 
 
@@ -105,17 +115,24 @@ def choose_penalty(
     return float(PENALTIES[int(np.argmin(losses))])
 
 
-def predict_fold(
-    case: Case, noise: Noise, training: Observations, test: Observations
-) -> dict[str, np.ndarray]:
-    """Residuals (M, 3) of the observations of a fold by each fit, m."""
+def fit_ours(case: Case, noise: Noise, training: Observations) -> dict[str, Fit]:
+    """Fits of the declared model that a diagnosis makes."""
     declared = fit_declared_model(case.model, training, noise)
-    left = find_noise_left(declared, training, [*case.candidates.values()])
-    matched = fit_model(declared.model, training, left, declared.estimate)
-    residuals = {
-        name: compute_position_residuals(fitted.model, fitted.estimate, test)
-        for name, fitted in zip(OURS, (declared, matched), strict=True)
-    }
+    noises = (
+        find_noise_left(declared, training, [*case.candidates.values()]),
+        estimate_sensor_noise(declared, training),
+    )
+    refits = [
+        fit_model(declared.model, training, left, declared.estimate) for left in noises
+    ]
+    chosen = choose_kept_fit(refits, training, Settings())
+    return dict(zip(OURS, (declared, *refits, chosen), strict=True))
+
+
+def predict_simple(
+    case: Case, declared: Fit, training: Observations, test: Observations
+) -> dict[str, np.ndarray]:
+    """Residuals (M, 3) of the observations of a fold by the simple fits, m."""
     columns, values = linearize_positions(declared, training)
     test_columns, test_values = linearize_positions(declared, test)
     is_free = find_placement_parameters([owner for owner, _ in declared.parameters])
@@ -127,9 +144,10 @@ def predict_fold(
         solve_minimal(columns, values),
         sizes * solve_ridge(columns * sizes, values, is_free, penalty),
     )
-    for name, solution in zip(SIMPLE, solutions, strict=True):
-        residuals[name] = (test_values - test_columns @ solution).reshape(-1, 3)
-    return residuals
+    return {
+        name: (test_values - test_columns @ solution).reshape(-1, 3)
+        for name, solution in zip(SIMPLE, solutions, strict=True)
+    }
 
 
 def cross_validate(case: Case, seed: int) -> dict[str, np.ndarray]:
@@ -147,16 +165,37 @@ def cross_validate(case: Case, seed: int) -> dict[str, np.ndarray]:
         test = select_states(observations, fold == number)
         test_pose = pose[fold == number][test.state]
         measured = np.bincount(test_pose, minlength=count)
-        for name, residual in predict_fold(case, noise, training, test).items():
+        fits = fit_ours(case, noise, training)
+        residuals = predict_simple(case, fits[OURS[0]], training, test)
+        for name, fitted in fits.items():
+            estimate = place_unseen_sessions(fitted, test)
+            residuals[name] = compute_position_residuals(fitted.model, estimate, test)
+        for name, residual in residuals.items():
             sums = np.bincount(test_pose, (residual**2).sum(axis=1), minlength=count)
             squares[name] += sums / np.maximum(measured, 1)
     return squares
 
 
+def judge_transfer(training: Case, held_out: Case) -> dict[str, np.ndarray]:
+    """Mean squared errors (poses,) of our fits at the held-out poses."""
+    test = held_out.observations
+    pose = index_poses(test.states)[test.state]
+    squares = {}
+    fits = fit_ours(training, estimate_noise(training)[0], training.observations)
+    for name, fitted in fits.items():
+        model, estimate = transfer_fit(fitted, training, held_out)
+        residual = compute_position_residuals(model, estimate, test)
+        sums = np.bincount(pose, (residual**2).sum(axis=1))
+        squares[name] = sums / np.bincount(pose)
+    return squares
+
+
 def print_comparison(name: str, squares: dict[str, np.ndarray]) -> None:
-    """Print RMS errors, and ratios to the better simple fit."""
+    """Print RMS errors, and ratios to the better simple fit, or else to the first
+    fit."""
     rms_mm = {fit: 1e3 * np.sqrt(values.mean()) for fit, values in squares.items()}
-    best = min(SIMPLE, key=rms_mm.__getitem__)
+    simple = [fit for fit in SIMPLE if fit in rms_mm]
+    best = min(simple or OURS[:1], key=rms_mm.__getitem__)
     count = len(squares[best])
     weights = np.random.default_rng(1).multinomial(
         count, np.full(count, 1.0 / count), REPLICATES
@@ -174,8 +213,13 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folders", nargs="+", type=Path)
     parser.add_argument("--seed", type=int, default=5)
+    parser.add_argument("--held-out", action="store_true")
     arguments = parser.parse_args()
     for folder in arguments.folders:
-        training_case, _ = read_cases(folder, ROOT / "config" / "robots")
-        squares = cross_validate(training_case, arguments.seed)
+        training_case, held_out_case = read_cases(folder, ROOT / "config" / "robots")
+        squares = (
+            judge_transfer(training_case, held_out_case)
+            if arguments.held_out
+            else cross_validate(training_case, arguments.seed)
+        )
         print_comparison(folder.name, squares)

@@ -6,7 +6,11 @@ import pytest
 from planted import planted
 
 from elastocal.diagnosis import adoption
-from elastocal.diagnosis.adoption import describe_losses, describe_missing_gain
+from elastocal.diagnosis.adoption import (
+    choose_kept_fit,
+    describe_losses,
+    describe_missing_gain,
+)
 from elastocal.diagnosis.model_averaging import PredictedGain
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import fit_model
@@ -48,6 +52,21 @@ def test_effects_that_only_fit_noise_are_not_adopted(seed, kuka):
     (sentence,) = describe_missing_gain(models, campaign.observations, WEAK, SETTINGS)
     assert "20 groups of neighbouring training poses" in sentence
     assert "stays as declared" in sentence
+
+
+def test_the_fit_that_predicts_left_out_poses_better_is_kept(kuka):
+    campaign = planted(kuka, {KEY: [5e-4]}, seed=2, poses=20)
+    poor, good = fit_effects(campaign, [KEY])
+    for fits in ((poor, good), (good, poor)):
+        assert choose_kept_fit(fits, campaign.observations, SETTINGS) is good
+
+
+def test_of_fits_that_predict_alike_the_one_with_fewer_parameters_is_kept(kuka):
+    """A robot without the effect is predicted alike with it and without."""
+    campaign = planted(kuka, {}, seed=2, poses=20)
+    simple, flexible = fit_effects(campaign, [KEY])
+    for fits in ((simple, flexible), (flexible, simple)):
+        assert choose_kept_fit(fits, campaign.observations, SETTINGS) is simple
 
 
 def make_gains(mean, std_error, groups=10):

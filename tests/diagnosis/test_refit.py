@@ -8,7 +8,11 @@ import pytest
 from planted import planted
 
 from elastocal.diagnosis.candidate_design import build_candidate_design
-from elastocal.diagnosis.refit import fit_selected_effects, select_effects
+from elastocal.diagnosis.refit import (
+    estimate_sensor_noise,
+    fit_selected_effects,
+    select_effects,
+)
 from elastocal.diagnosis.search import search_models
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import fit_model
@@ -86,3 +90,23 @@ def test_no_prior_of_the_fit_is_wider_than_before_the_measurements(search):
         ((effect, _),) = select_effects(design, model)
         prior_stds.append(effect.parameters[0].prior_std / term.sizes[0])
     np.testing.assert_allclose(prior_stds, [0.5 * before, before, before], rtol=1e-12)
+
+
+@pytest.mark.parametrize(("scatter", "factor"), [(3.0, 3.0), (0.2, 1.0)])
+def test_noise_from_the_sensor_alone_has_the_size_of_the_residual(
+    search, scatter, factor
+):
+    """It is no smaller than the noise that was measured."""
+    campaign, declared, _, _ = search
+    noise = replace(declared.noise, joint_rad=np.full(6, 1e-4), pose_rad=1e-4)
+    stream = np.random.default_rng(4)
+    residual = stream.normal(0.0, scatter * noise.position_m, declared.residual.shape)
+    fitted = replace(
+        declared,
+        noise=noise,
+        residual=residual / np.sqrt(campaign.observations.states.repeats[0]),
+        weights=np.ones_like(declared.weights),
+    )
+    estimated = estimate_sensor_noise(fitted, campaign.observations)
+    assert estimated.position_m == pytest.approx(factor * noise.position_m, rel=0.15)
+    assert not estimated.has_joint_error

@@ -273,11 +273,13 @@ def test_a_small_excess_over_hundreds_of_numbers_is_no_noise(
     measured = replace(fitted.noise, source=source, degrees_of_freedom=repeats)
     scattered = replace_noise(fitted, position_m=factor * measured.position_m)
     scattered = replace(scattered, residual=np.tile(fitted.residual, (4, 1)))
-    sentences = warn_of_excess_scatter(scattered, measured, SETTINGS.scatter_level)
+    sentences = warn_of_excess_scatter(
+        scattered, measured, factor, SETTINGS.scatter_level
+    )
     assert len(sentences) == count
     assert all("1.30 times" in sentence for sentence in sentences)
     unknown = replace(measured, source="residual")
-    assert warn_of_excess_scatter(scattered, unknown, 1.0) == []
+    assert warn_of_excess_scatter(scattered, unknown, factor, 1.0) == []
 
 
 @pytest.mark.parametrize(("pose_rad", "count"), [(4e-4, 0), (1e-3, 1)])

@@ -37,6 +37,8 @@ References
    relationship to the Schwarz criterion, JASA 90, 1995.
 .. [6] Mila, Mateu, Pebesma and Meyer, Nearest neighbour distance matching leave-one-out
    cross-validation for map validation, Methods in Ecology and Evolution 13, 2022.
+.. [7] Breiman, Friedman, Olshen and Stone, Classification and Regression Trees, 3.4.3,
+   1984.
 """
 
 from __future__ import annotations
@@ -67,6 +69,39 @@ TOO_UNCERTAIN = (
     "what was found is too uncertain to make predictions better:"
     " the model stays as declared"
 )
+
+
+def choose_kept_fit(
+    fits: Sequence[Fit], observations: Observations, settings: Settings
+) -> Fit:
+    """Choose the fit of the model that is kept if no effect is adopted.
+
+    A model that lacks something has no true noise: which weights suit its misfit is an
+    empirical question. Of the fits whose left-out poses are predicted as well as by the
+    best one, to one standard error, the one with the fewest effective parameters is
+    chosen (the one-standard-error rule [7]_).
+
+    Parameters
+    ----------
+    fits : sequence of Fit
+        Of one model, under different noise.
+    observations : Observations
+        What all were fitted to.
+    settings : Settings
+        Number of groups of poses.
+    """
+    group = _group_neighbours(observations, settings.adoption_groups)
+    squares = []
+    for fitted in fits:
+        left_out = predict_left_out_residuals(fitted, observations, group)
+        squares.append(_average_squares(_select_positions(left_out), group))
+    best = min(squares, key=np.mean)
+    as_good = [
+        fitted
+        for fitted, of_fit in zip(fits, squares, strict=True)
+        if _count_std_errors(of_fit, best) <= 1.0
+    ]
+    return min(as_good, key=count_effective_parameters)
 
 
 def describe_missing_gain(

@@ -742,7 +742,7 @@ def _add_effects(
         conclusion=conclusion,
         adopted=evidence.expected_to_help and not refusal,
     )
-    compared = _list_compared(evidence, models, observations)
+    compared = _list_compared(evidence, models, observations, context.settings)
     losses = adoption.describe_losses(frames, compared, observations, context.settings)
     evidence = replace(evidence, adopted=evidence.adopted and not losses)
     steps = [result.steps[0], Step("declared model", "declared", compared[0])]
@@ -772,7 +772,10 @@ def _test_residual(
 
 
 def _list_compared(
-    evidence: Evidence, models: tuple[Fit, Fit], observations: Observations
+    evidence: Evidence,
+    models: tuple[Fit, Fit],
+    observations: Observations,
+    settings: Settings,
 ) -> list[Fit]:
     """List the models to compare with frames alone: the declared one, and the one with
     the effects found if these are adopted.
@@ -782,9 +785,9 @@ def _list_compared(
     declared, full_model = models
     if evidence.adopted:
         return [declared, full_model]
-    if evidence.conclusion.best.named:
-        return [_refit_declared(evidence, declared, observations)]
-    return [full_model]
+    if evidence.conclusion.verdict in (verdict.ADEQUATE, verdict.NOT_TESTABLE):
+        return [full_model]
+    return [_fit_kept(evidence, declared, observations, settings)]
 
 
 def _refuse_adoption(
@@ -805,10 +808,11 @@ def _refuse_adoption(
     sample = subset.search_sample
     declared, full_model = models
     if sample is not subset.case.observations:
-        full_model = _refit_from(
-            full_model, sample, full_model.noise, INTERMEDIATE_TOLERANCE
+        declared, full_model = (
+            _refit_from(fitted, sample, fitted.noise, INTERMEDIATE_TOLERANCE)
+            for fitted in models
         )
-    kept = _refit_declared(evidence, declared, sample)
+    kept = _fit_kept(evidence, declared, sample, settings)
     predicted = model_averaging.predict_gain(
         evidence.design.problem, evidence.posterior, evidence.named_model
     )
@@ -817,18 +821,29 @@ def _refuse_adoption(
     )
 
 
-def _refit_declared(
-    evidence: Evidence, declared: Fit, observations: Observations
+def _fit_kept(
+    evidence: Evidence,
+    declared: Fit,
+    observations: Observations,
+    settings: Settings,
 ) -> Fit:
-    """Fit the declared model under the noise that it leaves by itself, because no
-    effect is adopted."""
-    noise = refit.estimate_residual_noise(
+    """Fit the declared model that is kept because no effect is adopted, under the noise
+    that it leaves: shared out between sensor, joints and poses, or all of it from the
+    sensor.
+
+    `declared`: fitted to the observations.
+    """
+    shared_out = refit.estimate_residual_noise(
         evidence.design.problem,
         evidence.posterior.empty_model,
         evidence.design.reference_fit.noise,
         declared.noise,
     )
-    return _refit_from(declared, observations, noise, CONVERGENCE_TOLERANCE)
+    fits = [
+        _refit_from(declared, observations, noise, CONVERGENCE_TOLERANCE)
+        for noise in (shared_out, refit.estimate_sensor_noise(declared, observations))
+    ]
+    return adoption.choose_kept_fit(fits, observations, settings)
 
 
 def _contradict(

@@ -21,7 +21,7 @@ import numpy as np
 from elastocal.effects.gravity import DECLARED_WEIGHT
 from elastocal.fitting.least_squares import CONVERGENCE_TOLERANCE, fit_model
 from elastocal.fitting.model import get_parameter_values
-from elastocal.fitting.noise import set_prior_std
+from elastocal.fitting.noise import count_effective_parameters, set_prior_std
 from elastocal.fitting.normal_equations import compute_whitening
 from elastocal.fitting.sensor_noise import compute_sensor_roots
 
@@ -172,6 +172,33 @@ def limit_pose_error(fitted: Fit, observations: Observations, pose_rad: float) -
         if excess < 1.0 + _NOISE_TOLERANCE:
             break
     return noise
+
+
+def estimate_sensor_noise(fitted: Fit, observations: Observations) -> Noise:
+    """Estimate the noise that a fit leaves if all of it came from the sensor, without
+    errors of joints and poses.
+
+    Parameters
+    ----------
+    fitted
+        A fit.
+    observations
+        Measurements that it was fitted to.
+
+    Returns
+    -------
+    Noise
+        Noise by which the residual has a mean square of 1 per degree of freedom.
+    """
+    noise = replace(
+        fitted.noise, joint_rad=np.zeros_like(fitted.noise.joint_rad), pose_rad=0.0
+    )
+    residual = fitted.residual * np.sqrt(fitted.weights)[:, None]
+    roots = compute_sensor_roots(fitted.model, fitted.estimate, observations, noise)
+    white = compute_whitening(observations, None, noise, roots).apply(residual)
+    degrees_of_freedom = white.size - count_effective_parameters(fitted)
+    mean_square = (white**2).sum() / max(degrees_of_freedom, 1.0)
+    return noise.scaled(float(np.sqrt(max(mean_square, 1.0))))
 
 
 def estimate_residual_noise(

@@ -30,6 +30,7 @@ from elastocal.diagnosis.verdict import (
     warn_of_excess_scatter,
 )
 from elastocal.fitting.model import get_joint_compliances
+from elastocal.validation.held_out import compute_scatter
 from elastocal.verdict import (
     Compliances,
     Convergence,
@@ -101,6 +102,7 @@ def state_training_verdict(
     """State the part of a verdict that the training poses decide."""
     declared = result.steps[1].fitted
     final = result.steps[-1].fitted
+    scatter = compute_scatter(final, result.noise, result.case.observations)
     held = {
         f"{owner} {parameter.name}"
         for (owner, parameter), is_held in zip(
@@ -115,7 +117,7 @@ def state_training_verdict(
         misfit=None,
         other_models_m=None,
         campaign=result.case.campaign.name,
-        noise=_state_noise(result.noise, final.noise),
+        noise=_state_noise(result.noise, final.noise.pose_rad, scatter),
         heldout=None,
         kept=result.steps[-1].kind.replace("kept", "frames"),
         compliance_urad_per_Nm=_state_compliances(
@@ -139,7 +141,7 @@ def state_training_verdict(
         *result.warnings,
         *stated.warnings,
         *warn_of_compliances(final),
-        *warn_of_excess_scatter(final, result.noise, settings.scatter_level),
+        *warn_of_excess_scatter(final, result.noise, scatter, settings.scatter_level),
     ]
     for name, fitted in (("declared", declared), ("final", final)):
         if not fitted.converged:
@@ -270,7 +272,7 @@ def _state_probabilities(evidence: Evidence) -> Probabilities:
     )
 
 
-def _state_noise(measured: Noise, final: Noise) -> NoiseEstimate:
+def _state_noise(measured: Noise, pose_rad: float, scatter: float) -> NoiseEstimate:
     """State the noise of the measurements, with the pose error and the scatter of the
     final model."""
     return NoiseEstimate(
@@ -279,8 +281,8 @@ def _state_noise(measured: Noise, final: Noise) -> NoiseEstimate:
         orientation_rad=measured.orientation_rad,
         joint_rad=tuple(measured.joint_rad.tolist()),
         degrees_of_freedom=measured.degrees_of_freedom,
-        pose_rad=final.pose_rad,
-        factor=final.position_m / measured.position_m,
+        pose_rad=pose_rad,
+        factor=scatter,
     )
 
 

@@ -535,9 +535,8 @@ def find_contradictions(final: Fit, measured: Noise, settings: Settings) -> list
     contradictions = []
     # Declared noise may be a guess; a warning says so if it is far from the residuals.
     if measured.source == "repeats":
-        contradictions += warn_of_scatter(
-            final.noise, measured, settings.largest_scatter
-        )
+        scatter = final.noise.position_m / measured.position_m
+        contradictions += warn_of_scatter(scatter, measured, settings.largest_scatter)
     contradictions += warn_of_pose_error(final.noise, settings.largest_pose_error_rad)
     if not final.model.identifies_compliance:
         return contradictions
@@ -563,7 +562,9 @@ def describe_repeatable_residual(repeatable: RepeatableResidual | None) -> list[
     ]
 
 
-def warn_of_excess_scatter(final: Fit, measured: Noise, level: float) -> list[str]:
+def warn_of_excess_scatter(
+    final: Fit, measured: Noise, scatter: float, level: float
+) -> list[str]:
     """Return a warning if the residuals of a model scatter more than the noise explains.
 
     The noise of repeats, or the stated one, bounds what may count as noise: the mean
@@ -576,10 +577,12 @@ def warn_of_excess_scatter(final: Fit, measured: Noise, level: float) -> list[st
         Fit of the model that is kept.
     measured : Noise
         Noise of the repeats, or declared noise.
+    scatter : float
+        Ratio of the noise that the model leaves to that one.
     level : float
         Probability of a warning if the noise is as stated.
     """
-    ratio = (final.noise.position_m / measured.position_m) ** 2
+    ratio = scatter**2
     freedom = final.residual.size - count_effective_parameters(final)
     if measured.source == "residual" or ratio <= 1.0 or freedom < 1.0:
         return []
@@ -590,27 +593,26 @@ def warn_of_excess_scatter(final: Fit, measured: Noise, level: float) -> list[st
         chance = chdtrc(freedom, freedom * ratio)
     if chance >= level:
         return []
-    (scatter,) = warn_of_scatter(final.noise, measured, 0.0)
+    (sentence,) = warn_of_scatter(scatter, measured, 0.0)
     return [
-        f"{scatter}, over {freedom:.0f} numbers, which chance makes in less than"
+        f"{sentence}, over {freedom:.0f} numbers, which chance makes in less than"
         f" {100 * level:g} % of campaigns: what exceeds that noise repeats, and counts as"
         " an error of the model"
     ]
 
 
-def warn_of_scatter(residual_noise: Noise, measured: Noise, least: float) -> list[str]:
+def warn_of_scatter(factor: float, measured: Noise, least: float) -> list[str]:
     """Return a warning if the residuals of a model scatter far more than the noise.
 
     Parameters
     ----------
-    residual_noise : Noise
-        Noise that the model leaves.
+    factor : float
+        Ratio of the noise that the model leaves to the measured one.
     measured : Noise
         Noise of the repeats, or declared noise.
     least : float
-        Ratio of the two from which on there is a warning.
+        Ratio from which on there is a warning.
     """
-    factor = residual_noise.position_m / measured.position_m
     if factor < least:
         return []
     if measured.source == "repeats":

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
 
 METRICS = ("mean_m", "rms_m", "p95_m", "max_m")
@@ -271,6 +272,36 @@ def compute_noise_floor(
             variance += (joint_errors**2).sum(axis=2)
         total += (variance.sum(axis=1) / block.states.repeats[block.state]).sum()
     return float(np.sqrt(total / len(observations)))
+
+
+def compute_scatter(fitted: Fit, measured: Noise, observations: Observations) -> float:
+    """Compute the ratio of the noise that a fit leaves to the measured noise.
+
+    Parameters
+    ----------
+    fitted : Fit
+        Its noise is the measured one, scaled, or comes from the sensor alone.
+    measured : Noise
+        Noise of the repeats, or declared noise.
+    observations : Observations
+        What was fitted.
+
+    Returns
+    -------
+    float
+        Ratio of the standard deviations of single measurements, without errors common
+        to a pose.
+    """
+    if fitted.noise.joint_rad.any() or not measured.joint_rad.any():
+        return fitted.noise.position_m / measured.position_m
+    # The measured noise comes from sensor and joints; its sum in position counts.
+    by_sensor, by_both = (
+        compute_noise_floor(
+            replace(fitted, noise=noise), observations, fitted.model, fitted.estimate
+        )
+        for noise in (fitted.noise, measured)
+    )
+    return by_sensor / by_both
 
 
 def summarize_errors_by_range(
