@@ -2,7 +2,8 @@
 
 The test is a posterior predictive check [1]_. Its discrepancy says how well ridge
 regressions on functions of the joint angles, fitted to the residuals of most
-configurations, predict the residuals of the other configurations.
+configurations, predict the residuals of the other configurations, in repeated
+cross-validation [3]_.
 
 Residuals are not independent errors: the fit has removed what its parameters can
 follow, and its priors have left what they do not allow. Chance is therefore simulated
@@ -17,6 +18,8 @@ References
    realized discrepancies, Statistica Sinica 6, 1996.
 .. [2] Cameron, Gelbach and Miller, Bootstrap-based improvements for inference with
    clustered errors, Review of Economics and Statistics 90, 2008.
+.. [3] Burman, A comparative study of ordinary cross-validation, v-fold cross-validation
+   and the repeated learning-testing methods, Biometrika 76, 1989.
 """
 
 from __future__ import annotations
@@ -25,7 +28,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -56,6 +59,12 @@ Basis = Callable[[Inputs], np.ndarray]
 # Level of the test: how often it rejects if the residual is chance alone.
 LEVEL = 0.01
 _FOLDS = 5
+# The result of a single partition into folds depends on chance, so scores are summed
+# over several partitions [3]_. Configurations are dealt out to groups once; each
+# partition combines the groups to folds anew, which needs no further pass through the
+# measurements.
+_GROUPS = 10
+_PARTITIONS = 4
 # Number of simulated data sets.
 _DRAWS = 299
 _MAX_OBSERVATIONS = 10_000
@@ -128,15 +137,15 @@ class _BasisProducts:
     ----------
     basis : Basis
     configuration : (M,) int array, configuration of each observation, 0 .. G-1
-    fold : (G,) int array, fold of each configuration, 0 .. K-1
+    group : (G,) int array, group of each configuration, 0 .. C-1
     residual : (G, D) array, products with the residuals of each configuration
-    gram : (K, D, D) array, Gram matrix of each fold
-    sensitivity : (K, D, P) array, products with the sensitivities of each fold
+    gram : (C, D, D) array, Gram matrix of each group
+    sensitivity : (C, D, P) array, products with the sensitivities of each group
     """
 
     basis: Basis
     configuration: np.ndarray
-    fold: np.ndarray
+    group: np.ndarray
     residual: np.ndarray
     gram: np.ndarray
     sensitivity: np.ndarray
@@ -158,8 +167,8 @@ class _BasisProducts:
         functions = weight * self.basis(inputs)
         products = (functions * weight * residual[:, :, None]).sum(axis=1)
         np.add.at(self.residual, configuration, products)
-        for number in range(_FOLDS):
-            members = self.fold[configuration] == number
+        for number in range(_GROUPS):
+            members = self.group[configuration] == number
             rows = functions[members].reshape(-1, functions.shape[2])
             self.gram[number] += rows.T @ rows
             # Explicit sizes, because a block may hold no member and a model no parameter.
@@ -189,23 +198,33 @@ class _CrossValidatedModel:
     ----------
     products : _BasisProducts
     scores : (1 + N,) array, products of left-out residuals and predictions over the norm
-        of the predictions: of the data, then of the simulated data sets
-    coefficients : (K, D) array, fitted to the data without each fold
+        of the predictions, summed over the partitions: of the data, then of the
+        simulated data sets
+    partitions : (R, C) int array, fold of each group of configurations
+    coefficients : (R, K, D) array, fitted to the data without each fold
     """
 
     products: _BasisProducts
     scores: np.ndarray
+    partitions: np.ndarray
     coefficients: np.ndarray
 
     def sum_predictions(self) -> tuple[np.ndarray, np.ndarray]:
         """Products (G,) of the predictions with the residuals of each configuration, and
-        with themselves, averaged over the configurations, m²."""
-        fold = self.products.fold
-        square = np.einsum(
-            "kd,kde,ke", self.coefficients, self.products.gram, self.coefficients
-        )
-        with_residual = (self.products.residual * self.coefficients[fold]).sum(axis=1)
-        return with_residual, np.full(len(fold), square / len(fold))
+        with themselves, averaged over the configurations, m²; both averaged over the
+        partitions."""
+        products = self.products
+        count = len(products.group)
+        with_residual = np.zeros(count)
+        square = 0.0
+        for fold, coefficients in zip(self.partitions, self.coefficients, strict=True):
+            of_group = coefficients[fold]
+            of_configuration = of_group[products.group]
+            with_residual += (products.residual * of_configuration).sum(axis=1)
+            square += np.einsum("cd,cde,ce", of_group, products.gram, of_group)
+        repetitions = len(self.partitions)
+        mean_square = square / (repetitions * count)
+        return with_residual / repetitions, np.full(count, mean_square)
 
 
 def _fit_models(
@@ -217,7 +236,10 @@ def _fit_models(
     """Fit all models of the residual to the data and to simulated data sets."""
     count = int(configuration.max()) + 1
     parameters = len(fitted.unidentifiable)
-    fold = stream.permutation(count) % _FOLDS
+    group = stream.permutation(count) % _GROUPS
+    partitions = stream.permuted(
+        np.tile(np.arange(_GROUPS) % _FOLDS, (_PARTITIONS, 1)), axis=1
+    )
     inputs = build_geometric_inputs(fitted.model, fitted.estimate, observations)
     size = int(np.clip(count, _MIN_FUNCTIONS, _MAX_FUNCTIONS))
     products = []
@@ -227,10 +249,10 @@ def _fit_models(
             _BasisProducts(
                 basis,
                 configuration,
-                fold,
+                group,
                 np.zeros((count, functions)),
-                np.zeros((_FOLDS, functions, functions)),
-                np.zeros((_FOLDS, functions, parameters)),
+                np.zeros((_GROUPS, functions, functions)),
+                np.zeros((_GROUPS, functions, parameters)),
             )
         )
     white_residual = fitted.whiten(fitted.residual)
@@ -261,7 +283,7 @@ def _fit_models(
     return [
         model
         for basis_products in products
-        for model in _cross_validate(basis_products, chance)
+        for model in _cross_validate(basis_products, chance, partitions)
     ]
 
 
@@ -329,42 +351,84 @@ def _draw_chance(
 
 
 def _cross_validate(
-    products: _BasisProducts, chance: _Chance
+    products: _BasisProducts, chance: _Chance, partitions: np.ndarray
 ) -> Iterator[_CrossValidatedModel]:
-    """Predict each fold by a ridge regression on the other folds, for each penalty.
+    """Predict each fold of each partition (R, C) by a ridge regression on the other
+    folds, for each penalty.
 
     The regressions are solved along the principal axes of the Gram matrix of the other
     folds.
     """
     projections = np.stack(
-        [_project_residuals(products, chance, number) for number in range(_FOLDS)]
+        [_project_residuals(products, chance, number) for number in range(_GROUPS)]
     )
-    folds = []
-    for gram, projection in zip(products.gram, projections, strict=True):
-        eigenvalues, axes = np.linalg.eigh(products.gram.sum(axis=0) - gram)
-        training = (projections.sum(axis=0) - projection) @ axes
-        mean = eigenvalues.mean()
-        folds.append(
-            (np.maximum(eigenvalues, 0.0), mean, axes, training, projection @ axes)
-        )
+    left_out_folds = [
+        _rotate_to_principal_axes(products.gram, projections, fold == number)
+        for fold in partitions
+        for number in range(_FOLDS)
+    ]
     for penalty in _PENALTIES:
         with_residual, square = np.zeros((2, 1 + _DRAWS))
         coefficients = []
-        for eigenvalues, mean, axes, training, left_out in folds:
-            shrunk = training / (eigenvalues + penalty * mean)
-            with_residual += (left_out * shrunk).sum(axis=1)
+        for of_fold in left_out_folds:
+            eigenvalues = of_fold.eigenvalues
+            shrunk = of_fold.training / (eigenvalues + penalty * of_fold.mean)
+            with_residual += (of_fold.left_out * shrunk).sum(axis=1)
             square += (eigenvalues * shrunk**2).sum(axis=1)
-            coefficients.append(axes @ shrunk[0])
+            coefficients.append(of_fold.axes @ shrunk[0])
         scores = with_residual / np.sqrt(square)
-        yield _CrossValidatedModel(products, scores, np.stack(coefficients))
+        by_fold = np.reshape(coefficients, (len(partitions), _FOLDS, -1))
+        yield _CrossValidatedModel(products, scores, partitions, by_fold)
+
+
+class _LeftOutFold(NamedTuple):
+    """A fold, along the D principal axes of the Gram matrix of all other folds.
+
+    Attributes
+    ----------
+    eigenvalues : (D,) array, of this Gram matrix
+    mean : mean of the eigenvalues
+    axes : (D, D) array, principal axes
+    training, left_out : (1 + N, D) arrays
+        Products of the basis in the other folds, and in this one, with the residuals of
+        the data and of the simulated data sets.
+    """
+
+    eigenvalues: np.ndarray
+    mean: float
+    axes: np.ndarray
+    training: np.ndarray
+    left_out: np.ndarray
+
+
+def _rotate_to_principal_axes(
+    gram: np.ndarray, projections: np.ndarray, is_left_out: np.ndarray
+) -> _LeftOutFold:
+    """Leave out a fold, and express its and the other measurements' products along the
+    principal axes of the other ones.
+
+    Parameters
+    ----------
+    gram : (C, D, D) array, Gram matrix of each group
+    projections : (C, 1 + N, D) array, products of each group with the residuals
+    is_left_out : (C,) bool array, groups of the fold
+    """
+    eigenvalues, axes = np.linalg.eigh(gram[~is_left_out].sum(axis=0))
+    return _LeftOutFold(
+        np.maximum(eigenvalues, 0.0),
+        float(eigenvalues.mean()),
+        axes,
+        projections[~is_left_out].sum(axis=0) @ axes,
+        projections[is_left_out].sum(axis=0) @ axes,
+    )
 
 
 def _project_residuals(
     products: _BasisProducts, chance: _Chance, number: int
 ) -> np.ndarray:
-    """Products (1 + N, D) of a basis in one fold with the residuals of the data and of
+    """Products (1 + N, D) of a basis in one group with the residuals of the data and of
     the simulated data sets."""
-    members = products.fold == number
+    members = products.group == number
     residual = products.residual[members]
     simulated = (
         chance.factor[:, members] @ residual
