@@ -15,7 +15,8 @@ from tempfile import TemporaryDirectory
 from unittest.mock import patch
 
 import numpy as np
-from gross_error_rates import NOISE_M, REFLECTORS, ROBOTS, Robot, measure
+from common import ROBOTS
+from gross_error_rates import NOISE_M, REFLECTORS, Robot, measure
 from scipy.stats import t as student_t
 
 from elastocal.campaigns.writing import write_campaign

@@ -15,6 +15,7 @@ from elastocal.mechanics.robot_file import parse_robot
 from elastocal.study.strategies import Strategy, strategy_from_document
 
 ROOT = Path(__file__).resolve().parents[1]
+ROBOTS = ROOT / "config" / "robots"
 # Seconds of `_yardstick` on the machine for which limits in seconds are stated: two idle
 # cores of an AMD EPYC, the smallest CPU time of 40 runs.
 YARDSTICK_S = 0.14
@@ -48,19 +49,29 @@ class Row:
     how: str
 
     @classmethod
+    def of_slowdown(
+        cls, benchmark: str, ours_s: float, theirs_s: float, largest: float, how: str
+    ) -> "Row":
+        """Require that ours takes at most `largest` times as long as theirs."""
+        ratio = ours_s / theirs_s
+        target = f"<= {largest:g}"
+        return cls(benchmark, ours_s, theirs_s, ratio, target, ratio <= largest, how)
+
+    @classmethod
+    def of_speedup(
+        cls, benchmark: str, ours_s: float, theirs_s: float, smallest: float, how: str
+    ) -> "Row":
+        """Require that theirs takes at least `smallest` times as long as ours."""
+        ratio = theirs_s / ours_s
+        target = f">= {smallest:g}"
+        return cls(benchmark, ours_s, theirs_s, ratio, target, ratio >= smallest, how)
+
+    @classmethod
     def of_limit(
         cls, benchmark: str, seconds: float, allowed_s: float, how: str
     ) -> "Row":
         """Compare seconds with those that are allowed on this machine."""
-        return cls(
-            benchmark,
-            seconds,
-            allowed_s,
-            seconds / allowed_s,
-            "<= 1",
-            seconds <= allowed_s,
-            how,
-        )
+        return cls.of_slowdown(benchmark, seconds, allowed_s, 1.0, how)
 
 
 def interleaved(
@@ -86,15 +97,21 @@ def interleaved(
     seconds: list[list[float]] = [[] for _ in functions]
     for repetition in range(1, repetitions + 1):
         for times, function in zip(seconds, functions.values(), strict=True):
-            start = _cpu_seconds()
-            function()
-            times.append(_cpu_seconds() - start)
+            times.append(measure_cpu(function)[1])
         last = ", ".join(
             f"{name} {times[-1]:.3f} s"
             for name, times in zip(functions, seconds, strict=True)
         )
         print(f"  {repetition}/{repetitions}: {last}", flush=True)
     return seconds
+
+
+def measure_cpu(function: Callable[[], Result]) -> tuple[Result, float]:
+    """Call a function; return its result and the CPU seconds that it takes, those of
+    its processes included."""
+    start = _cpu_seconds()
+    result = function()
+    return result, _cpu_seconds() - start
 
 
 def _cpu_seconds() -> float:
@@ -140,10 +157,14 @@ def _yardstick(clock: Callable[[], float] = time.perf_counter) -> float:
     return (clock() - start) / rounds
 
 
+def read_robot_document(name: str) -> dict[str, Any]:
+    """Read a file of config/robots."""
+    return read_document(ROBOTS / f"{name}.yaml")
+
+
 def load_robot(name: str) -> Robot:
     """Load a robot of config/robots."""
-    path = ROOT / "config" / "robots" / f"{name}.yaml"
-    return parse_robot(read_document(path), path.name)
+    return parse_robot(read_robot_document(name), f"{name}.yaml")
 
 
 def load_strategy(name: str) -> Strategy:

@@ -12,16 +12,16 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import resource
 import subprocess
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 import pandas as pd
-from common import compare_processor, load_robot
+from common import compare_processor, load_robot, measure_cpu
 from target_path import make_target_path
 
 import elastocal as ec
@@ -48,18 +48,17 @@ def write_model(robot: Robot, path: Path) -> None:
 
 def correct(folder: Path) -> tuple[float, pd.DataFrame]:
     """Run the command in a folder; return its CPU seconds and the targets."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     files = ["arm.json", "path.csv", "--output", "targets.csv"]
     options = ["--partial", "--force", "--allow-large-steps"]
-    subprocess.run(
+    run = partial(
+        subprocess.run,
         [sys.executable, "-m", "elastocal", "correct", *files, *options],
         cwd=folder,
         env=os.environ | {"OMP_NUM_THREADS": "1"},
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
     )
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    _, seconds = measure_cpu(run)
     return seconds, pd.read_csv(folder / "targets.csv")
 
 

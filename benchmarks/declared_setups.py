@@ -20,17 +20,15 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-import yaml
-from common import ROOT
 from declared_values import (
+    ARMS,
     CAMPAIGN,
     HELD_OUT,
-    ROBOTS,
     Specimen,
     calibrate,
     draw_specimen,
     measure_true_errors,
-    read_weightless,
+    read_compliant,
     write_and_read,
 )
 from rates import format_count_rate
@@ -81,9 +79,7 @@ def draw_loaded_case(
     """Measure a robot whose load acts `off_m` beside its declared point; return its case
     and its true compliances."""
     name = HEAVY_ROBOTS[seed % len(HEAVY_ROBOTS)]
-    document = read_weightless(name)
-    text = (ROOT / "config" / "robots" / f"{name}.yaml").read_text()
-    document["compliance_urad_per_Nm"] = yaml.safe_load(text)["compliance_urad_per_Nm"]
+    document = read_compliant(name)
     arm = build_arm(document | {"masses": []})
     shift = off_m * draw_direction(np.random.default_rng([seed, 66]))
     robot = SimulatedRobot(
@@ -188,7 +184,7 @@ def draw_sessions(
 def correct_after_sessions(seed: int, off_m: float, std_m: float) -> Outcome:
     """Diagnose and correct a robot that was measured in sessions, and compare its true
     tool with the bounds."""
-    specimen = draw_specimen(ROBOTS[seed % len(ROBOTS)], seed, 0.0, 0.0)
+    specimen = draw_specimen(ARMS[seed % len(ARMS)], seed, 0.0, 0.0)
     case, held_out = draw_sessions(specimen, seed, off_m, std_m)
     judgement, calibrated = calibrate(case, held_out, seed)
     error_m, reached = measure_true_errors(specimen, calibrated, seed)

@@ -21,7 +21,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import yaml
-from common import ROOT
+from common import ROBOTS, read_robot_document
 from rates import format_count_rate
 
 from elastocal.application.accuracy import predict_errors, select_campaign_commands
@@ -53,7 +53,7 @@ from elastocal_proof.plant.simulated_robot import (
     simulate_poses,
 )
 
-ROBOTS = ("kuka", "iiwa14", "ur5", "gen3")
+ARMS = ("kuka", "iiwa14", "ur5", "gen3")
 LIMITED_TURN_DEG = 170.0
 HELD_OUT = 20
 # Geometry errors of each link, of an ordinary robot.
@@ -96,7 +96,7 @@ class Specimen:
 def read_weightless(name: str) -> dict:
     """Read a robot file without masses and compliances, its joints within half a turn
     to either side."""
-    document = yaml.safe_load((ROOT / "config" / "robots" / f"{name}.yaml").read_text())
+    document = read_robot_document(name)
     document = {
         key: value
         for key, value in document.items()
@@ -107,6 +107,12 @@ def read_weightless(name: str) -> dict:
         -LIMITED_TURN_DEG, LIMITED_TURN_DEG
     ).tolist()
     return document
+
+
+def read_compliant(name: str) -> dict:
+    """Read a robot file as `read_weightless`, but with its compliances."""
+    key = "compliance_urad_per_Nm"
+    return read_weightless(name) | {key: read_robot_document(name)[key]}
 
 
 def draw_specimen(name: str, seed: int, off_m: float, pose_rad: float) -> Specimen:
@@ -176,15 +182,13 @@ def write_and_read(
         path = Path(folder) / "declared"
         write_campaign(path, document, table, joints, "csv")
         (path / "robot.yaml").write_text(yaml.safe_dump(robot))
-        return read_cases(path, ROOT / "config" / "robots")
+        return read_cases(path, ROBOTS)
 
 
 def draw_pose_error_case(name: str, seed: int, pose_rad: float, noise_m: float) -> Case:
     """Measure a robot with a pose error, and no other error, under five loads at 20
     poses."""
-    document = read_weightless(name)
-    text = (ROOT / "config" / "robots" / f"{name}.yaml").read_text()
-    document["compliance_urad_per_Nm"] = yaml.safe_load(text)["compliance_urad_per_Nm"]
+    document = read_compliant(name)
     arm = build_arm(document | {"masses": []})
     design = Design(
         poses=20 + HELD_OUT,
@@ -217,7 +221,7 @@ def draw_pose_error_case(name: str, seed: int, pose_rad: float, noise_m: float) 
 def measure_false_effects(seed: int, noise_m: float) -> bool:
     """Diagnose a robot with a pose error; return whether it gets an effect that it does
     not have."""
-    name = ROBOTS[seed % len(ROBOTS)]
+    name = ARMS[seed % len(ARMS)]
     pose_rad = np.random.default_rng([seed, 65]).uniform(5e-5, 3e-4)
     case = draw_pose_error_case(name, seed, pose_rad, noise_m)
     diagnosis = diagnose(case, Settings(), seed)
@@ -290,9 +294,9 @@ def calibrate(
 
 def correct_specimen(seed: int, off_m: float, noise_m: float, poses: int) -> Outcome:
     """Diagnose and correct a robot, and compare its true tool with what is stated."""
-    name = ROBOTS[seed % len(ROBOTS)]
+    name = ARMS[seed % len(ARMS)]
     specimen = draw_specimen(name, seed, off_m, 0.0)
-    frame = ("base", "tracker")[seed // len(ROBOTS) % 2]
+    frame = ("base", "tracker")[seed // len(ARMS) % 2]
     case, held_out = draw_cases(specimen, poses, noise_m, seed, frame)
     judgement, calibrated = calibrate(case, held_out, seed)
     error_m, reached = measure_true_errors(specimen, calibrated, seed)

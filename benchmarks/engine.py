@@ -21,7 +21,7 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from common import ROOT, Row, beside_yardstick, interleaved
+from common import ROBOTS, ROOT, Row, beside_yardstick, interleaved
 
 from elastocal.campaigns.importers import FOLDER_VARIABLE, find_importer
 from elastocal.campaigns.writing import write_campaign
@@ -38,7 +38,6 @@ from elastocal_proof.plant.campaigns import Design, draw_schedule, simulate_meas
 from elastocal_proof.plant.kinds import Defect, apply_defects
 from elastocal_proof.plant.simulated_robot import draw_specimen
 
-ROBOTS = ROOT / "config" / "robots"
 SEED = 2026
 # Effects of the fit. Like most effects of a measured robot, their basis functions do not
 # depend on the estimate.
@@ -191,15 +190,7 @@ def _fit(work: Path, measurements: int, repetitions: int) -> Row:
         f"a robust fit against one numpy.linalg.lstsq of {size[0]} rows and"
         f" {size[1]} parameters, minimum of {repetitions}"
     )
-    return Row(
-        "engine fit",
-        ours,
-        theirs,
-        ours / theirs,
-        f"<= {FIT_TARGET:g}",
-        ours / theirs <= FIT_TARGET,
-        how,
-    )
+    return Row.of_slowdown("engine fit", ours, theirs, FIT_TARGET, how)
 
 
 def _folds(measurements: int, repetitions: int) -> Row:
@@ -221,15 +212,7 @@ def _folds(measurements: int, repetitions: int) -> Row:
         f"ridge regressions on unions of {FOLDS} folds of {measurements} measurements"
         f" against the same without common matrices, minimum of {repetitions}"
     )
-    return Row(
-        "engine folds",
-        ours,
-        theirs,
-        ours / theirs,
-        f"<= {FOLDS_TARGET:g}",
-        ours / theirs <= FOLDS_TARGET,
-        how,
-    )
+    return Row.of_slowdown("engine folds", ours, theirs, FOLDS_TARGET, how)
 
 
 def _regress(inputs: Inputs, residual: np.ndarray, *, shared: bool) -> None:

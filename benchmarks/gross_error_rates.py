@@ -17,7 +17,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from common import ROOT
+from common import ROBOTS
 from rates import format_count_rate
 
 from elastocal.campaigns.writing import write_campaign
@@ -28,7 +28,6 @@ from elastocal_proof.plant.kinds import KINDS, Defect, apply_defects
 from elastocal_proof.plant.laws import add_drive_law
 from elastocal_proof.plant.simulated_robot import draw_specimen, simulate_poses
 
-ROBOTS = ROOT / "config" / "robots"
 ARMS = ("kuka", "iiwa14", "abb", "gen3")
 # Reflectors on the flange, m.
 REFLECTORS = {"A": (0.1, 0.0, 0.05), "B": (-0.05, 0.09, 0.05), "C": (-0.05, -0.09, 0.1)}

@@ -92,17 +92,7 @@ def rows(work: Path, setting: Setting) -> list[Row]:
         f" and {configurations} prefixes, 6DoF on kuka, minimum of {repetitions},"
         f" equal to {TOLERANCE:g}"
     )
-    return [
-        Row(
-            "identification",
-            alone,
-            theirs,
-            theirs / alone,
-            f">= {TARGET}",
-            theirs / alone >= TARGET,
-            how,
-        )
-    ]
+    return [Row.of_speedup("identification", alone, theirs, TARGET, how)]
 
 
 def _measurements(

@@ -15,7 +15,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from common import ROOT
+from common import ROBOTS
 from rates import format_rate, make_parser
 
 from elastocal.campaigns.reading import read_robot
@@ -40,7 +40,6 @@ from elastocal_proof.plant.simulated_robot import (
 )
 
 ROBOT = "ur10"
-ROBOTS = ROOT / "config" / "robots"
 # Effects that act on a robot without a load, and their sizes in plausible sizes: some ten
 # times the noise at the tool.
 TIMES = {

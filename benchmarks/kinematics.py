@@ -94,12 +94,4 @@ def _row(name: str, setting: Setting) -> Row:
         " pin.computeFrameJacobian in a Python loop, one thread,"
         f" minimum of {setting.repetitions}, Jacobians equal to {TOLERANCE:g}"
     )
-    return Row(
-        f"kinematics {name}",
-        ours,
-        theirs,
-        theirs / ours,
-        f">= {TARGET}",
-        theirs / ours >= TARGET,
-        how,
-    )
+    return Row.of_speedup(f"kinematics {name}", ours, theirs, TARGET, how)

@@ -80,25 +80,17 @@ def rows(work: Path, setting: Setting) -> list[Row]:
         f" bare {_smallest(plans[bare, many]).seconds:.1f} s"
         f" and {_smallest(plans[bare, many]).peak_mb:.0f} MB"
     )
-    time_ratio = our_cost.seconds / bare_cost.seconds
     memory_ratio = our_cost.peak_mb / bare_cost.peak_mb
-    limit = f"<= {TARGET}"
     return [
-        Row(
-            "plan time",
-            our_cost.seconds,
-            bare_cost.seconds,
-            time_ratio,
-            limit,
-            time_ratio <= TARGET,
-            f"CPU of {how}",
+        Row.of_slowdown(
+            "plan time", our_cost.seconds, bare_cost.seconds, TARGET, f"CPU of {how}"
         ),
         Row(
             "plan memory",
             None,
             None,
             memory_ratio,
-            limit,
+            f"<= {TARGET}",
             memory_ratio <= TARGET,
             f"memory of {how}",
         ),

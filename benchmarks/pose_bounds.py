@@ -15,7 +15,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from common import ROOT
+from common import ROBOTS
 
 from elastocal.application.accuracy import predict_errors
 from elastocal.application.calibrated import CalibratedRobot, predict_poses
@@ -34,7 +34,6 @@ from elastocal_proof.plant.simulated_robot import (
     simulate_poses,
 )
 
-ROBOTS = ROOT / "config" / "robots"
 # Arms of six and seven joints.
 ARMS = ("kuka", "fanuc", "iiwa14")
 EFFECTS = ("hysteresis", "hysteresis twice", "lost_motion", "none")

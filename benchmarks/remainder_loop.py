@@ -18,12 +18,12 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
+from common import ROBOTS
 from remainder_rates import (
     HELD_OUT,
     JOINT_RAD,
     NOISE_M,
     OFFSET_RAD,
-    ROBOTS,
     measured_cases,
 )
 

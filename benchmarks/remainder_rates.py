@@ -15,7 +15,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from common import ROOT
+from common import ROBOTS
 
 from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.simulation import Plan as Survey
@@ -39,7 +39,6 @@ OFFSET_RAD = 2e-4
 HELD_OUT = 150
 NOISE = Noise("declared", NOISE_M, NOISE_M, np.full(6, JOINT_RAD))
 LEVELS = (0.01, 0.05)
-ROBOTS = ROOT / "config" / "robots"
 
 
 def measured_cases(

@@ -104,15 +104,8 @@ def rows(work: Path, setting: Setting) -> list[Row]:
 def _time_row(small: dict[str, Usage], large: dict[str, Usage], compared: str) -> Row:
     ours = sum(usage.seconds for usage in large.values())
     theirs = sum(usage.seconds for usage in small.values())
-    return Row(
-        "scale time",
-        ours,
-        theirs,
-        ours / theirs,
-        f"<= {TIME_TARGET}",
-        ours / theirs <= TIME_TARGET,
-        f"sum of the seconds of {', '.join(STEPS)}: {compared}",
-    )
+    how = f"sum of the seconds of {', '.join(STEPS)}: {compared}"
+    return Row.of_slowdown("scale time", ours, theirs, TIME_TARGET, how)
 
 
 def _memory_row(small: dict[str, Usage], large: dict[str, Usage], compared: str) -> Row:

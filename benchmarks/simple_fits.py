@@ -16,7 +16,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from common import ROOT
+from common import ROBOTS
 from scipy.linalg import qr
 
 from elastocal.diagnosis.adoption import choose_kept_fit
@@ -216,7 +216,7 @@ if __name__ == "__main__":
     parser.add_argument("--held-out", action="store_true")
     arguments = parser.parse_args()
     for folder in arguments.folders:
-        training_case, held_out_case = read_cases(folder, ROOT / "config" / "robots")
+        training_case, held_out_case = read_cases(folder, ROBOTS)
         squares = (
             judge_transfer(training_case, held_out_case)
             if arguments.held_out

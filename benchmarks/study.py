@@ -72,17 +72,7 @@ def rows(work: Path, setting: Setting) -> list[Row]:
         f"snakemake {' '.join(setting.jobs)} on a clean copy against the same scripts"
         " one after the other in one process, CPU"
     )
-    return [
-        Row(
-            "study",
-            ours,
-            alone,
-            ours / alone,
-            f"<= {TARGET:g}",
-            ours / alone <= TARGET,
-            how,
-        )
-    ]
+    return [Row.of_slowdown("study", ours, alone, TARGET, how)]
 
 
 def finished_study(work: Path, setting: Setting) -> Path:

@@ -17,8 +17,9 @@ from typing import Any
 
 import numpy as np
 import yaml
+from common import ROBOTS
 from rates import make_parser
-from weak_springs import FALSE_NAME, ROBOTS, declare_masses, write_simulated_campaign
+from weak_springs import FALSE_NAME, declare_masses, write_simulated_campaign
 
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.settings import Settings

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 import yaml
-from common import ROOT
+from common import ROBOTS
 from rates import make_parser
 
 from elastocal.campaigns.writing import write_campaign
@@ -33,7 +33,6 @@ from elastocal_proof.plant.campaigns import (
 )
 from elastocal_proof.plant.simulated_robot import SimulatedRobot, draw_specimen
 
-ROBOTS = ROOT / "config" / "robots"
 ARMS = ("kuka", "gp180", "iiwa14", "panda")
 FALSE_NAME = 0.65
 

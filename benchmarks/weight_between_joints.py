@@ -16,8 +16,9 @@ from typing import Any
 
 import numpy as np
 import yaml
+from common import ROBOTS
 from rates import make_parser
-from weak_springs import ROBOTS, declare_masses, write_simulated_campaign
+from weak_springs import declare_masses, write_simulated_campaign
 
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge

@@ -15,6 +15,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from run import summarize
 
 from elastocal.campaigns.campaign import Measurements, tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
@@ -50,7 +51,6 @@ ARMS = {
     "kuka_14": "iiwa14",
 }
 REPLICATES = 1000
-SEED = 1
 
 
 def main(folder: Path) -> None:
@@ -60,13 +60,14 @@ def main(folder: Path) -> None:
         paths = find_recordings(folder / "data" / arm)
         recordings = [read_recording(path) for path in paths]
         distance_m, held_out = fit_geometry(recordings, robot)
-        low, high = bootstrap_rms(distance_m)
-        own = f"{1e3 * compute_rms(distance_m):.3f} ({low:.3f}-{high:.3f})"
+        ours = summarize(distance_m, REPLICATES)
+        low, high = ours.interval_mm
+        own = f"{ours.rms_mm:.3f} ({low:.3f}-{high:.3f})"
         urdf = folder / "calibrated_urdf" / arm / "panda_calibrated.urdf"
         theirs = "none published"
         if urdf.is_file():
             theirs_m = measure_urdf(urdf, recordings, held_out)
-            theirs = f"{1e3 * compute_rms(theirs_m):.3f}"
+            theirs = f"{summarize(theirs_m, REPLICATES).rms_mm:.3f}"
         print(arm, len(distance_m), own, theirs, sep=", ", flush=True)
 
 
@@ -109,21 +110,6 @@ def measure_urdf(
         for row, value in zip(recording.angles, distance, strict=True):
             distances[tuple(row)] = value
     return np.array([distances[tuple(row)] for row in held_out.joint_angles])
-
-
-def compute_rms(values: np.ndarray) -> float:
-    return float(np.sqrt((values**2).mean()))
-
-
-def bootstrap_rms(distance_m: np.ndarray) -> tuple[float, float]:
-    """Return the 95 % interval of the RMS over poses, mm."""
-    rng = np.random.default_rng(SEED)
-    draws = [
-        1e3 * compute_rms(rng.choice(distance_m, len(distance_m)))
-        for _ in range(REPLICATES)
-    ]
-    low, high = np.quantile(draws, [0.025, 0.975])
-    return float(low), float(high)
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pandas as pd
 
 import elastocal as ec
@@ -115,10 +116,10 @@ def count_lines(package: str) -> int:
     return sum(bool(line.strip()) for line in lines)
 
 
-def summarize(errors_m: list[float]) -> Errors:
-    """Summarize errors, with a bootstrap over poses."""
+def summarize(errors_m: npt.ArrayLike, replicates: int = 2000) -> Errors:
+    """Summarize errors (poses,), with a bootstrap over poses."""
     errors_mm = 1e3 * np.array(errors_m)
-    draws = np.random.default_rng(1).choice(errors_mm, (2000, len(errors_mm)))
+    draws = np.random.default_rng(1).choice(errors_mm, (replicates, len(errors_mm)))
     low, high = np.quantile(np.sqrt((draws**2).mean(axis=1)), [0.025, 0.975])
     rms = float(np.sqrt((errors_mm**2).mean()))
     return Errors(rms, float(errors_mm.max()), (float(low), float(high)))
