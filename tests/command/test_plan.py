@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 import yaml
 from analysed_robots import ROBOTS, analysed
+from scipy.spatial.transform import Rotation
 
 from elastocal.application.calibrated import compute_nominal_poses
 
@@ -173,3 +174,108 @@ def test_a_folder_that_check_refuses_is_refused_before_the_planning(
     folder = tmp_path / name
     refusal(*PLAN, "--folder", folder)
     assert not folder.exists()
+
+
+PANDA = (
+    "plan",
+    ROBOTS / "panda.yaml",
+    "--candidates",
+    200,
+    "--held-out",
+    4,
+)
+SOCKETS = (
+    "--measured",
+    "point",
+    "--place",
+    "left=0.45,0.1,0.05",
+    "--place",
+    "right=0.5,-0.1,0.05",
+    "--target",
+    "ball:7DoF=0,0,-0.1",
+)
+
+
+@pytest.mark.drawn
+def test_a_plan_of_sockets_is_a_sheet_to_fill_in_with_joint_angles(elastocal, tmp_path):
+    folder = tmp_path / "cell"
+    result = elastocal(*PANDA, "--poses", 32, *SOCKETS, "--folder", folder)
+    assert result.exit_code == 0, result.exception
+    assert "with the joint angles of each contact" in " ".join(result.stderr.split())
+    assert {path.name for path in folder.iterdir()} == FILES | {"plan.csv"}
+    document = yaml.safe_load((folder / "campaign.yaml").read_text())
+    assert document["measured"] == "point"
+    assert document["features"] == {"left": {}, "right": {}}
+    assert document["targets"] == {"ball": {"point": "7DoF", "offset_m": "unknown"}}
+    sheet = pd.read_csv(folder / "measurements.csv")
+    # What was planned is only the way to the socket.
+    assert sheet[[f"q{joint}" for joint in range(1, 8)]].isna().all(axis=None)
+    assert len(sheet) == 36 and set(sheet["feature"]) == {"left", "right"}
+    planned = pd.read_csv(folder / "plan.csv")
+    filled = sheet.drop(columns="done").assign(
+        **{name: planned[name] for name in planned if re.fullmatch(r"q\d", name)}
+    )
+    filled.to_csv(folder / "measurements.csv", index=False)
+    checked = elastocal("check", folder)
+    assert checked.exit_code == 0, checked.exception
+
+
+def see_board(sheet, board_m):
+    """Poses of a board in the camera on the flange of a Panda, columns by name."""
+    commands = sheet[[f"q{joint}" for joint in range(1, 8)]].to_numpy()
+    position, rotation = compute_nominal_poses(analysed("panda"), commands)
+    inverse = Rotation.from_matrix(rotation).inv()
+    numbers = np.hstack([inverse.apply(board_m - position), inverse.as_rotvec()])
+    numbers += 1e-4 * np.random.default_rng(1).standard_normal(numbers.shape)
+    return dict(zip(("x", "y", "z", "rx", "ry", "rz"), numbers.T, strict=True))
+
+
+@pytest.mark.drawn
+def test_a_plan_of_a_camera_is_a_sheet_for_poses_of_the_board(elastocal, tmp_path):
+    folder = tmp_path / "cell"
+    options = ("--measured", "board", "--place", "board=0.5,0,0.02", "--poses", 20)
+    result = elastocal(*PANDA, *options, "--folder", folder)
+    assert result.exit_code == 0, result.exception
+    document = yaml.safe_load((folder / "campaign.yaml").read_text())
+    assert document["camera"] == "on_robot" and document["frame"] == "unknown"
+    # Its noise is estimated, because declared noise is taken for alike in all poses.
+    assert "noise" not in document
+    sheet = pd.read_csv(folder / "measurements.csv")
+    assert "feature" not in sheet and sheet[["x", "rz"]].isna().all(axis=None)
+    assert not sheet["q1"].isna().any()
+    # A board that is seen where the robot puts it has a campaign that can be checked.
+    filled = sheet.assign(**see_board(sheet, np.array([0.5, 0.0, 0.02])), done="x")
+    filled.to_csv(folder / "measurements.csv", index=False)
+    checked = elastocal("check", folder)
+    assert checked.exit_code == 0, checked.exception
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--measured", "relative"], "'relative', which has no plans"),
+        (["--measured", "points"], "point"),
+        (["--measured", "point"], "no place"),
+        (["--place", "left=0.4,0,0"], "--place"),
+        (["--measured", "point", "--place", "left=0.4,0"], "left=x,y,z,nx,ny,nz"),
+        (["--measured", "point", "--place", "left=0.4,0,0,0,0,0"], "a direction"),
+        ([*SOCKETS, "--limit", "tilt=3"], "tilt_deg=60"),
+        ([*SOCKETS, "--limit", "tilt_deg=-3"], "above 0"),
+        ([*SOCKETS, "--base-known"], "--base-known"),
+        ([*SOCKETS, "--force", "10"], "--force"),
+        ([*SOCKETS, "--tracker", "1,2,3"], "--tracker"),
+        ([*SOCKETS, "--target", "A:2DoF"], "2 targets"),
+        ([*SOCKETS, "--place", "far=9,0,0"], "the arm does not reach it"),
+        (
+            ["--measured", "board", "--place", "a=1,0,0", "--place", "b=0,1,0"],
+            "2 places",
+        ),
+    ],
+)
+def test_a_wrong_place_is_refused_by_its_option(refusal, tmp_path, options, message):
+    folder = tmp_path / "cell"
+    found = " ".join(
+        refusal(*PANDA, "--poses", 32, *options, "--folder", folder).split()
+    )
+    assert message in found
+    assert list(tmp_path.iterdir()) == []

@@ -30,14 +30,18 @@ if TYPE_CHECKING:
 
     from elastocal.application.planning.cell import Cell
     from elastocal.application.planning.plan import Plan
-    from elastocal.application.planning.survey import Sensor, Survey
+    from elastocal.application.planning.reaching import SetUp
+    from elastocal.application.planning.survey import Survey
     from elastocal.campaigns.campaign import Target
+    from elastocal.measuring.protocol import Sensor
     from elastocal.mechanics.chain import Chain
     from elastocal.mechanics.robot import Robot
 
 ROBOT = "robot.yaml"
 SHEET = "plan.pdf"
 PICTURE = "plan.png"
+# Configurations to which a robot is driven before it is led into contact.
+PLANNED = "plan.csv"
 # Number of allowed configurations over which changes of a plan are compared, and the
 # share of its error below which a change is worth a sentence.
 _WORKSPACE = 300
@@ -80,12 +84,36 @@ def plan(
         Option("--pull", help="The load pulls in any direction. Default: it hangs."),
     ] = False,
     measured: Annotated[
-        Literal["position", "pose"],
+        str,
         Option(
-            help="Measured quantity of a target, and its default noise: position by a laser"
-            " tracker, or pose by its 6DoF probe."
+            help="Kind of measurement, and its default noise: position by a laser tracker,"
+            " pose by its 6DoF probe; or without a tracker board, point (a ball in a"
+            " socket), plane, sphere, distance or line."
         ),
     ] = "position",
+    place: Annotated[
+        list[str] | None,
+        Option(
+            help="Without a tracker: where a feature roughly is, in m, base axes. A socket,"
+            " plane or dial gauge NAME=x,y,z,nx,ny,nz (point and outward direction, 0,0,1"
+            " if left out), a board too; a sphere NAME=x,y,z,radius; an anchor"
+            " NAME=x,y,z."
+        ),
+    ] = None,
+    limit: Annotated[
+        list[str] | None,
+        Option(
+            help="Bound within which the kind can measure, such as tilt_deg=40; an unknown"
+            " one is answered with all."
+        ),
+    ] = None,
+    camera: Annotated[
+        Literal["on-robot", "beside-robot"],
+        Option(
+            help="Where the camera is that sees the board. The --place of a camera beside"
+            " the robot has the direction of its view."
+        ),
+    ] = "on-robot",
     base_known: Annotated[
         bool, Option("--base-known", help="Measurements are in the base frame.")
     ] = False,
@@ -93,7 +121,8 @@ def plan(
         list[str] | None,
         Option(
             help="A target and its measuring point: POINT, POINT=x,y,z in m, or with a"
-            " name of its own A:POINT=x,y,z."
+            " name of its own A:POINT=x,y,z. Without a tracker the offset only says where"
+            " tip, camera or board roughly is."
         ),
     ] = None,
     tracker: Annotated[
@@ -144,20 +173,34 @@ def plan(
     from elastocal.application.planning.plan import choose_plan, find_allowed_candidates
     from elastocal.application.planning.survey import Survey
     from elastocal.application.pose_counts import warn_of_few_poses
+    from elastocal.campaigns.campaign import Target
     from elastocal.campaigns.reading import read_robot
+    from elastocal.command.plan_places import PlaceOptions, read_setup
 
     arm = read_robot(robot)
     console = Console(stderr=True)
     sensor = _choose_sensor(measured, noise, orientation_noise)
+    targets = _read_targets(target or [arm.chain.end_effector.name], arm.chain)
+    setup = read_setup(
+        PlaceOptions(measured, place or (), limit or (), camera),
+        {"--tracker": tracker, "--base-known": base_known, "--force": force},
+        arm,
+        targets,
+    )
+    if setup is not None:
+        # The fit finds what the offset says roughly.
+        targets = tuple(Target(item.name, item.point, None) for item in targets)
     survey = Survey(
         arm,
-        _read_targets(target or [arm.chain.end_effector.name], arm.chain),
-        not base_known,
+        targets,
+        # Features anywhere do not say where the base is, and need no frame of their own.
+        not base_known if setup is None else not setup.has_features,
         measured,
         sensor.position_m,
         sensor.orientation_rad,
         force,
         pull,
+        setup,
     )
     cell = _read_cell(arm, box or (), tracker, floor)
     _check_new_folder(folder)
@@ -186,10 +229,20 @@ def plan(
             *(f"! {warning}" for warning in warnings),
             f"sheet to print: {folder / SHEET}",
         ],
-        "measure, then"
-        f" {format_command('import', 'csv', 'tracker.csv', '--folder', folder)}",
+        _describe_next(setup, folder),
         console,
     )
+
+
+def _describe_next(setup: SetUp | None, folder: Path) -> str:
+    """Say what comes after the plan."""
+    if setup is None:
+        table = format_command("import", "csv", "tracker.csv", "--folder", folder)
+        return f"measure, then {table}"
+    filled = f"fill in {folder / 'measurements.csv'}"
+    if setup.kind.is_contact:
+        filled += " with the joint angles of each contact"
+    return f"measure, {filled}, then {format_command('check', folder)}"
 
 
 def _choose_sensor(
@@ -199,23 +252,26 @@ def _choose_sensor(
 
     Its description is empty if all of its noise is stated.
     """
-    from elastocal.application.planning.survey import SENSORS, Sensor
+    from elastocal.command.plan_places import read_kind
+    from elastocal.measuring.protocol import Sensor
 
-    usual = SENSORS[measured]
+    kind = read_kind(measured)
+    usual = kind.sensor
+    assert usual is not None, "kinds without a sensor are refused"
     position_m = usual.position_m
     orientation_rad = usual.orientation_rad
     if noise is not None:
         position_m = parse_length_m("--noise", noise)
     if orientation_noise is not None:
-        if measured != "pose":
+        if kind.numbers != 6:
             raise InputError(
                 "--orientation-noise",
                 "",
-                "positions, which have no orientation",
-                "--measured pose beside it",
+                f"{measured}, which has no orientation",
+                "--measured pose or board beside it",
             )
         orientation_rad = parse_angle_rad("--orientation-noise", orientation_noise)
-    all_stated = noise and (orientation_noise or measured == "position")
+    all_stated = noise and (orientation_noise or kind.numbers != 6)
     description = "" if all_stated else usual.description
     return Sensor(description, position_m, orientation_rad)
 
@@ -311,7 +367,7 @@ def _describe_plan(survey: Survey, chosen: Plan, sensor: Sensor) -> list[str]:
     low, median, high = 1e3 * np.quantile(chosen.random_m[:, -1], [0.05, 0.5, 0.95])
     frame = format_frame(survey.frame, offset_removed=survey.offset_removed)
     noise = f"{1e6 * survey.position_m:.3g} µm"
-    if survey.measured == "pose":
+    if survey.rows == 6:
         noise += f", {1e6 * survey.orientation_rad:.3g} µrad"
     source = f"; {sensor.description}" if sensor.description else ""
     return [
@@ -320,7 +376,7 @@ def _describe_plan(survey: Survey, chosen: Plan, sensor: Sensor) -> list[str]:
         " that the cell allows; with as many random poses"
         f" {median:.3f} mm ({low:.3f} to {high:.3f}). {_describe_tool(survey)}",
         "It is a standard error by the uncertainty of the parameters alone,"
-        " without the tracker's noise.",
+        f" without the noise of {'the tracker' if survey.setup is None else 'the measurement'}.",
         f"Assumed noise: {noise}{source}.",
     ]
 
@@ -337,9 +393,10 @@ def _describe_improvement(accuracy_m: dict[str, float]) -> list[str]:
         for change, error_m in accuracy_m.items()
         if change not in ("", best)
     ]
+    others = f" ({'; '.join(further)})" if further else ""
     return [
         f"What would help most: {best}, {format_millimetres(accuracy_m[best])}"
-        f" in place of {format_millimetres(accuracy_m[''])} ({'; '.join(further)})."
+        f" in place of {format_millimetres(accuracy_m[''])}{others}."
     ]
 
 
@@ -347,8 +404,8 @@ def _describe_tool(survey: Survey) -> str:
     """Say whether the error contains that of the tool's offset."""
     if survey.offset_removed:
         return (
-            "The offset of the tool is not in it, because that of the reflector is fitted"
-            " in its place."
+            "The offset of the tool is not in it, because that of the"
+            f" {'reflector' if survey.setup is None else 'target'} is fitted in its place."
         )
     return "The offset of the tool is in it, known as well as that of the reflectors."
 
@@ -371,6 +428,7 @@ def _write_campaign(
     from elastocal.application.planning.sheet import (
         build_campaign_document,
         build_sheet,
+        clear_joint_angles,
     )
     from elastocal.campaigns.campaign import DOCUMENT
     from elastocal.campaigns.measurements import CSV
@@ -384,11 +442,16 @@ def _write_campaign(
     from elastocal.report.typesetting import compile_document
 
     table = build_sheet(survey, chosen)
+    written = {CSV: table}
+    if survey.setup is not None and survey.setup.kind.is_contact:
+        written = {CSV: clear_joint_angles(table), PLANNED: table}
     facts = collect_plan_facts(survey, chosen, table, sentences)
     document = build_campaign_document(folder.name, ROBOT, survey, chosen)
-    with write_together(folder, (ROBOT, CSV, SHEET, PICTURE, DOCUMENT)) as partial:
+    names = (ROBOT, *written, SHEET, PICTURE, DOCUMENT)
+    with write_together(folder, names) as partial:
         write_text(partial / ROBOT, read_text(robot_file, LARGEST_BYTES))
-        write_csv(partial / CSV, table)
+        for name, rows in written.items():
+            write_csv(partial / name, rows)
         figures = {"overview": draw_plan(survey.robot, cell, chosen)}
         for page, figure in enumerate(draw_poses(survey.robot, chosen)):
             figures[f"poses{page}"] = figure

@@ -29,18 +29,22 @@ class ShapedNoise:
     reference_m : float
         RMS standard deviation of a coordinate that is read, such as that of the board in
         the camera. The noise of a fit scales all factors by what it has instead.
+    range_m : float or None
+        Range at which the errors are as large as the factors; None for the median.
     """
 
     kind: Kind
     camera: str
     factors: np.ndarray
     reference_m: float = 1.0
+    range_m: float | None = None
 
     def describe(self, observations: Observations) -> NoiseShape:
         """Describe the shape of the noise of observations."""
         assert observations.rotation is not None
+        options = {"camera": self.camera, "range_m": self.range_m}
         shape = self.kind.shape_noise(
-            observations.position, observations.rotation, {"camera": self.camera}
+            observations.position, observations.rotation, options
         )
         assert shape is not None
         return shape

@@ -9,12 +9,13 @@ import numpy as np
 
 from elastocal.application.planning.cell import build_cell
 from elastocal.application.planning.plan import choose_plan, find_allowed_candidates
-from elastocal.application.planning.survey import SENSORS, Survey
+from elastocal.application.planning.survey import Survey
 from elastocal.campaigns.campaign import OFFSET_STD_M, Target
 from elastocal.campaigns.simulation import Plan as SimulatedPlan
 from elastocal.campaigns.simulation import draw_measurements
 from elastocal.interface.campaigns import Campaign
 from elastocal.loop.overview import Overview, inspect_case
+from elastocal.measuring.position import POSITION
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -97,7 +98,7 @@ def plan(
     InputError
         Names the argument, what was found and what is allowed.
     """
-    sensor = SENSORS["position"]
+    sensor = POSITION.sensor
     end = robot.chain.end_effector.name
     tracked = tuple(
         Target(name, end, offset_m, offset_std_m=OFFSET_STD_M)

@@ -3,7 +3,8 @@
 The anchor may be anywhere. A draw wire that does not start at zero has an unknown zero.
 """
 
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from elastocal.measuring.protocol import (
     Feature,
     Kind,
     Prediction,
+    Sensor,
     Unknown,
     describe_number,
     describe_point,
@@ -36,6 +38,10 @@ class Distance(Kind):
         "zero_m": "measurement at no distance: 0 if left out, a number, or unknown",
         "zero_std_m": "standard deviation of the zero, 0 if left out",
     }
+    sensor = Sensor("draw wire, 0.1 mm", 1e-4)
+    place_keys: ClassVar = {"x": None, "y": None, "z": None}
+    # Near the anchor the direction of a wire is uncertain; usual wires are 2 m long.
+    limits: ClassVar = {"shortest_m": 0.1, "longest_m": 2.0}
 
     def unknowns(self, feature: Feature) -> tuple[Unknown, ...]:
         """List the coordinates of the anchor and the zero of the measurements."""
@@ -70,6 +76,26 @@ class Distance(Kind):
         by_unknowns = np.column_stack([-direction, np.ones(len(position))])
         residual = numbers[:, 0] - (distance + values[3])
         return predict_along(residual, direction, by_unknowns)
+
+    def convert_place(self, place: np.ndarray) -> np.ndarray:
+        """Return the anchor, and no zero."""
+        return np.array([*place, 0.0])
+
+    def check_poses(
+        self,
+        position: np.ndarray,
+        rotation: np.ndarray,
+        place: np.ndarray,
+        options: Mapping[str, Any],
+    ) -> dict[str, np.ndarray]:
+        """Check that the wire is neither too short nor too long."""
+        distance = measure_distances(position, place)[0]
+        return {
+            "the target is too near to the anchor (shortest_m)": distance
+            >= options["shortest_m"],
+            "the target is too far from the anchor (longest_m)": distance
+            <= options["longest_m"],
+        }
 
     def deviate(self, feature: Feature, values: np.ndarray) -> np.ndarray:
         """Return how far anchor and zero are from what was stated."""

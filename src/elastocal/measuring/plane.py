@@ -4,7 +4,8 @@ The number is the height of the target over the plane, zero where it touches: th
 radius of a touching ball shifts the plane and nothing else.
 """
 
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -14,7 +15,9 @@ from elastocal.measuring.protocol import (
     Feature,
     Kind,
     Prediction,
+    Sensor,
     Unknown,
+    check_approach,
     predict_along,
     read_direction,
     span_plane,
@@ -33,6 +36,10 @@ class Plane(Kind):
     keys: ClassVar = {
         "normal": "[x, y, z] out of the plane towards the robot, roughly, or unknown"
     }
+    sensor = Sensor("tip on a granite table, whose form is 0.05 mm", 5e-5)
+    place_keys: ClassVar = {"x": None, "y": None, "z": None, "nx": 0, "ny": 0, "nz": 1}
+    # A table or the face of a block is no larger, and a shaft does not lie on it.
+    limits: ClassVar = {"extent_m": 0.5, "tilt_deg": 60.0}
 
     def unknowns(self, feature: Feature) -> tuple[Unknown, ...]:
         """List two tilts and the height of the plane."""
@@ -71,6 +78,29 @@ class Plane(Kind):
             [position @ span_plane(normal).T, -np.ones(len(position))]
         )
         return predict_along(numbers[:, 0] - height, normal, by_unknowns)
+
+    def state_place(self, place: np.ndarray) -> dict[str, Any]:
+        """Return the rough normal."""
+        return {self.direction_key: place[3:].tolist()}
+
+    def convert_place(self, place: np.ndarray) -> np.ndarray:
+        """Convert a point (3,) of the plane and its normal (3,) to normal and height."""
+        return np.array([*place[3:], place[3:] @ place[:3]])
+
+    def check_poses(
+        self,
+        position: np.ndarray,
+        rotation: np.ndarray,
+        place: np.ndarray,
+        options: Mapping[str, Any],
+    ) -> dict[str, np.ndarray]:
+        """Check that the tip touches the face, and comes from outside."""
+        distance = np.linalg.norm(position - place[:3], axis=1)
+        is_on_face = distance <= options["extent_m"]
+        return {
+            "the tip is beyond the face (extent_m)": is_on_face,
+            **check_approach(rotation, place[3:], options["tilt_deg"]),
+        }
 
     def state(self, values: np.ndarray) -> np.ndarray:
         """Return the direction cosines of the normal with x and y, and the height."""

@@ -4,7 +4,8 @@ A row has no number. It states that the target was at the place at these joint a
 The place is exactly known, known with a standard deviation, or unknown.
 """
 
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -12,7 +13,9 @@ from elastocal.measuring.protocol import (
     Feature,
     Kind,
     Prediction,
+    Sensor,
     Unknown,
+    check_approach,
     describe_point,
     deviate_point,
     predict_position,
@@ -31,6 +34,12 @@ class Point(Kind):
         "std_m": "standard deviation of the stated coordinates: one number or three, "
         "0.0002 where it is left out, 0 where they are exact by definition",
     }
+    sensor = Sensor(
+        "ball in a printed socket, play stated by the makers of MUKCa", 1e-4
+    )
+    place_keys: ClassVar = {"x": None, "y": None, "z": None, "nx": 0, "ny": 0, "nz": 1}
+    # A ball stays in a socket of half a sphere while the shaft clears its rim.
+    limits: ClassVar = {"tilt_deg": 60.0}
 
     def unknowns(self, feature: Feature) -> tuple[Unknown, ...]:
         """List the coordinates of the place."""
@@ -57,6 +66,16 @@ class Point(Kind):
         """Predict how far the target is from the place; see `Kind.evaluate`."""
         by_place = np.tile(-np.eye(3), (len(position), 1, 1))
         return predict_position(values - position, by_place)
+
+    def check_poses(
+        self,
+        position: np.ndarray,
+        rotation: np.ndarray,
+        place: np.ndarray,
+        options: Mapping[str, Any],
+    ) -> dict[str, np.ndarray]:
+        """Check that the shaft is in the opening of the socket."""
+        return check_approach(rotation, place[3:], options["tilt_deg"])
 
     def deviate(self, feature: Feature, values: np.ndarray) -> np.ndarray:
         """Return how far the place is from where it was stated."""

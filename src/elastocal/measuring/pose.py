@@ -1,8 +1,17 @@
-"""Pose of a target in the frame of the session, as a tracker of six components has it."""
+"""Pose of a target in the frame of the session, as a tracker of six components has it.
+
+Its position is as accurate as that of `position`; the angles of its probe are from [1].
+
+[1] Hexagon, data sheet of the Leica T-Mac: rotation angles to 0.01 deg, which is 18 um
+at 100 mm.
+"""
+
+import math
 
 import numpy as np
 
-from elastocal.measuring.protocol import Kind, Prediction
+from elastocal.measuring.position import TRACKER_ERROR, TRACKER_M
+from elastocal.measuring.protocol import Kind, Prediction, Sensor
 from elastocal.mechanics.kinematics import compute_pose_differences
 
 
@@ -13,6 +22,11 @@ class Pose(Kind):
     meaning = "position and orientation of the target in the frame of the session"
     numbers = 6
     columns = ("x", "y", "z", "rx", "ry", "rz")
+    sensor = Sensor(
+        f"laser tracker and 6DoF probe, {TRACKER_ERROR} at 7.5 m and of 0.01° (Leica T-Mac)",
+        TRACKER_M,
+        math.radians(0.005),
+    )
 
     def evaluate(
         self,

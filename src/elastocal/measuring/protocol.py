@@ -83,6 +83,21 @@ class Prediction:
 
 
 @dataclass(frozen=True)
+class Sensor:
+    """A measuring instrument.
+
+    Attributes
+    ----------
+    description : the instrument, and where its noise is from.
+    position_m, orientation_rad : standard deviation of a coordinate and of an angle.
+    """
+
+    description: str
+    position_m: float
+    orientation_rad: float = 0.0
+
+
+@dataclass(frozen=True)
 class NoiseShape:
     """Shape of the noise of M measurements of r numbers, whose sizes are estimated.
 
@@ -114,6 +129,12 @@ class Kind:
     touches : whether the columns may be left out, because contact means zero.
     keys : keys of a feature of this kind, each with its meaning; None if rows refer to
         no feature.
+    sensor : the usual instrument, whose noise a plan assumes; None if there is none.
+    place_keys : numbers that tell a plan where a feature roughly is, in base axes, each
+        with its default; None if it must be stated. Empty if the kind has no plans
+        without a tracker. Without features they describe the frame of the session: its
+        origin, and the direction of its z.
+    limits : bounds on the poses in which the kind can measure, with their defaults.
     """
 
     name: str
@@ -123,12 +144,21 @@ class Kind:
     is_converted: bool = False
     touches: bool = False
     keys: ClassVar[Mapping[str, str] | None] = None
+    sensor: ClassVar[Sensor | None] = None
+    place_keys: ClassVar[Mapping[str, float | None]] = {}
+    limits: ClassVar[Mapping[str, float]] = {}
 
     @property
     def reads_poses(self) -> bool:
         """Whether a row is the pose or position of the target in the session's frame,
         or can be converted to it without any unknown."""
         return self.keys is None
+
+    @property
+    def is_contact(self) -> bool:
+        """Whether a row states that the target touches, and the joint angles of the
+        contact are what is measured."""
+        return self.touches or not self.columns
 
     def check(self, feature: Feature) -> None:
         """Refuse a feature whose keys are not those of the kind, or not of their form."""
@@ -196,6 +226,52 @@ class Kind:
         values : (V,) array.
         """
         raise NotImplementedError
+
+    def state_place(self, place: np.ndarray) -> dict[str, Any]:
+        """Return the keys of a feature of campaign.yaml that a place (K,) of a plan
+        states."""
+        return {}
+
+    def convert_place(self, place: np.ndarray) -> np.ndarray:
+        """Convert a place (K,), numbers of `place_keys`, to values (V,) of `evaluate`."""
+        return place[:3]
+
+    def aim(
+        self,
+        position: np.ndarray,
+        rotation: np.ndarray,
+        place: np.ndarray,
+        options: Mapping[str, Any],
+    ) -> Prediction:
+        """Predict numbers that are zero where a target can be measured.
+
+        A plan moves the robot by Newton's method until they are, or until `check_poses`
+        allows the pose. For a contact these are the residuals of the contact.
+
+        Parameters
+        ----------
+        position, rotation : (M, 3) and (M, 3, 3) arrays, pose of the target in the frame
+            of the session, m. The z axis of a tip is that of its shaft, out of it.
+        place : (K,) array, numbers of `place_keys`.
+        options : `limits`, and the keys ``camera`` of the campaign.
+        """
+        numbers = np.zeros((len(position), self.numbers))
+        values = self.convert_place(place)
+        return self.evaluate(position, rotation, numbers, values)
+
+    def check_poses(
+        self,
+        position: np.ndarray,
+        rotation: np.ndarray,
+        place: np.ndarray,
+        options: Mapping[str, Any],
+    ) -> dict[str, np.ndarray]:
+        """Check whether poses can be measured, apart from the contact.
+
+        Returns (M,) bool by constraint, true if it is met. The name of a constraint says
+        what is wrong otherwise. Arguments as in `aim`.
+        """
+        return {}
 
     def move(self, values: np.ndarray, step: np.ndarray) -> np.ndarray:
         """Move the values (V,) of a feature by a step (K,) of its unknowns."""
@@ -294,6 +370,28 @@ def describe_number(feature: Feature, key: str, std_key: str) -> Unknown:
         return Unknown(name, "m", ANYWHERE_M)
     std = float(read_std(feature, std_key)[0])
     return Unknown(name, "m", std, std)
+
+
+def check_approach(
+    rotation: np.ndarray, normal: np.ndarray, largest_tilt_deg: float
+) -> dict[str, np.ndarray]:
+    """Check whether tips come from the side to which a normal points.
+
+    Parameters
+    ----------
+    rotation : (M, 3, 3) array, whose z axes are those of the shafts, out of the tip.
+    normal : (3,) or (M, 3) unit vectors out of what is touched.
+    largest_tilt_deg : largest angle between shaft and normal.
+    """
+    cosine = -(rotation[:, :, 2] * normal).sum(axis=1)
+    is_upright = cosine >= np.cos(np.radians(largest_tilt_deg))
+    return {"the shaft of the tip is too oblique (tilt_deg)": is_upright}
+
+
+def orient(direction: np.ndarray) -> np.ndarray:
+    """Make a rotation (3, 3) whose z axis is a direction (3,)."""
+    normal = direction / np.linalg.norm(direction)
+    return np.column_stack([*span_plane(normal), normal])
 
 
 def span_plane(normal: np.ndarray) -> np.ndarray:

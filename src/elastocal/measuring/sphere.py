@@ -4,7 +4,8 @@ The number is the height of the target over the sphere, zero where it touches. T
 radius contains that of the tip.
 """
 
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -12,7 +13,9 @@ from elastocal.measuring.protocol import (
     Feature,
     Kind,
     Prediction,
+    Sensor,
     Unknown,
+    check_approach,
     describe_number,
     describe_point,
     deviate_point,
@@ -38,6 +41,10 @@ class Sphere(Kind):
         "radius_m": "radius of the sphere and of the tip together, or unknown",
         "radius_std_m": "standard deviation of the stated radius, 0.0002 if left out",
     }
+    sensor = Sensor("touch probe on a calibration ball", 1e-5)
+    place_keys: ClassVar = {"x": None, "y": None, "z": None, "radius": None}
+    # The shaft of a probe comes from outside of the ball.
+    limits: ClassVar = {"tilt_deg": 60.0}
 
     def unknowns(self, feature: Feature) -> tuple[Unknown, ...]:
         """List centre and radius."""
@@ -76,6 +83,21 @@ class Sphere(Kind):
         by_unknowns = np.column_stack([-direction, -np.ones(len(position))])
         residual = numbers[:, 0] - (distance - values[3])
         return predict_along(residual, direction, by_unknowns)
+
+    def convert_place(self, place: np.ndarray) -> np.ndarray:
+        """Return centre and radius."""
+        return place
+
+    def check_poses(
+        self,
+        position: np.ndarray,
+        rotation: np.ndarray,
+        place: np.ndarray,
+        options: Mapping[str, Any],
+    ) -> dict[str, np.ndarray]:
+        """Check that the tip comes from outside of the ball."""
+        normal = measure_distances(position, place[:3])[1]
+        return check_approach(rotation, normal, options["tilt_deg"])
 
     def deviate(self, feature: Feature, values: np.ndarray) -> np.ndarray:
         """Return how far centre and radius are from what was stated."""

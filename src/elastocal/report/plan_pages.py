@@ -60,20 +60,19 @@ def collect_plan_facts(
     # People hang masses, not forces.
     hanging = [_format_hanging_mass(survey)] if survey.hanging else []
     heads += ["hang (kg)"] * len(hanging)
-    poses = [
-        {
-            "cells": [
-                *_format_pose(pose, measurements, angle_columns, force_columns),
-                *hanging,
-            ],
-            "visits": _count_visits(survey, measurements),
-        }
-        for pose, measurements in rows.groupby("pose")
-    ]
+    feature_columns = ["feature"] if "feature" in rows else []
+    heads += feature_columns
+    poses = []
+    for pose, measurements in rows.groupby("pose"):
+        cells = _format_pose(pose, measurements, angle_columns, force_columns)
+        features = [measurements[name].iloc[0] for name in feature_columns]
+        visits = _count_visits(survey, measurements)
+        poses.append({"cells": [*cells, *hanging, *features], "visits": visits})
     fitted = len(plan.fitted.joint_angles)
     return {
         "robot": survey.robot.name,
         "targets": [_describe_target(target) for target in survey.targets],
+        "contact": survey.setup is not None and survey.setup.kind.is_contact,
         "loaded": survey.loaded,
         "hanging": survey.hanging,
         "counts": [

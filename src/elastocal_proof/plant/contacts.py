@@ -66,10 +66,9 @@ class Workshop:
         low, high = self.joint_limits.T
         for _ in range(_MOST_TRIALS_A_POSE):
             angles: np.ndarray | None = self.draw_angles()
-            if self.approximate is not None:
-                angles = _approach(self.approximate, angles, height)
-            if angles is not None:
-                angles = _approach(self.locate, angles, height)
+            for locate in (self.approximate, self.locate):
+                if locate is not None and angles is not None:
+                    angles = _approach(locate, angles, height)
             if angles is not None and ((angles >= low) & (angles <= high)).all():
                 return angles
         raise ValueError("the robot does not reach this contact within its limits")

@@ -10,11 +10,11 @@ import numpy as np
 
 from elastocal.application.planning.designs import add_prior, compute_mean_gram
 from elastocal.application.planning.survey import (
-    SENSORS,
     compute_accuracy_rows,
     compute_information_rows,
 )
 from elastocal.campaigns.campaign import Target
+from elastocal.measuring.pose import POSE
 
 if TYPE_CHECKING:
     from elastocal.application.planning.plan import Candidates
@@ -45,14 +45,13 @@ def compare_improvements(
     names = {target.name for target in survey.targets}
     end_effector = survey.robot.chain.end_effector.name
     on_end = [target for target in survey.targets if target.point == end_effector]
-    if len(on_end) == 1:
+    if survey.setup is None and len(on_end) == 1:
         targets = (*survey.targets, *_add_reflectors(on_end[0], names))
         bracket = f"three reflectors on {end_effector}, {_APART_M:g} m apart"
         changes[bracket] = (replace(survey, targets=targets), 1)
     if survey.measured == "position":
-        sensor = SENSORS["pose"]
         measured = replace(
-            survey, measured="pose", orientation_rad=sensor.orientation_rad
+            survey, measured="pose", orientation_rad=POSE.sensor.orientation_rad
         )
         changes["orientations beside positions"] = (measured, 1)
     changes["twice as many poses"] = (survey, 2)
@@ -86,7 +85,9 @@ def _compute_accuracy(
     copies: int,
 ) -> float:
     """Compute the accuracy of a changed survey, as `survey` states it, m."""
-    rows = compute_information_rows(changed, fitted.joint_angles, fitted.force)
+    rows = compute_information_rows(
+        changed, fitted.joint_angles, fitted.force, fitted.place
+    )
     flat = rows.reshape(-1, rows.shape[2])
     information = add_prior(copies * (flat.T @ flat))
     accuracy_rows = compute_accuracy_rows(

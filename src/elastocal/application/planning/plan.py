@@ -18,6 +18,7 @@ from elastocal.application.planning.designs import (
     count_effective_parameters,
     exchange_candidates,
 )
+from elastocal.application.planning.reaching import reach_places
 from elastocal.application.planning.survey import (
     compute_accuracy_rows,
     compute_information_rows,
@@ -30,7 +31,9 @@ from elastocal.fitting.model import list_parameters
 
 if TYPE_CHECKING:
     from elastocal.application.planning.cell import Cell
+    from elastocal.application.planning.reaching import SetUp
     from elastocal.application.planning.survey import Survey
+    from elastocal.mechanics.robot import Robot
 
 # Number of allowed configurations over which the accuracy is averaged.
 _WORKSPACE = 300
@@ -60,14 +63,17 @@ class Candidates:
     ----------
     joint_angles : (N, n) as the controller reports them, rad.
     force : (N, 3) full load, N, base axes.
+    place : (N,) int, place of the set-up that is measured in each; None for a tracker.
     """
 
     joint_angles: np.ndarray
     force: np.ndarray
+    place: np.ndarray | None = None
 
     def select(self, chosen: np.ndarray | list[int] | slice) -> Candidates:
         """Select configurations by their numbers."""
-        return Candidates(self.joint_angles[chosen], self.force[chosen])
+        place = None if self.place is None else self.place[chosen]
+        return Candidates(self.joint_angles[chosen], self.force[chosen], place)
 
 
 @dataclass(frozen=True)
@@ -116,7 +122,12 @@ def find_allowed_candidates(
     halton = qmc.Halton(robot.commands, seed=seed)
     shares = halton.random(_DRAWS_PER_CANDIDATE * count)
     angles = robot.spread_angles(shares, robot.joint_limits)
-    angles = angles[~find_beyond_limits(robot, angles).any(axis=1)]
+    place = None
+    if survey.setup is not None:
+        angles, place = _find_measurable(survey.setup, robot, angles)
+    is_within = ~find_beyond_limits(robot, angles).any(axis=1)
+    angles = angles[is_within]
+    place = None if place is None else place[is_within]
     reported = robot.reported_angles(angles)
     checks = check_configurations(cell, robot, survey.targets, reported)
     allowed = np.flatnonzero(np.all(list(checks.values()), axis=0))[:count]
@@ -130,7 +141,35 @@ def find_allowed_candidates(
             "room for the arm and its targets",
         )
     forces = survey.draw_forces(len(allowed), np.random.default_rng(seed))
-    return Candidates(reported[allowed], forces)
+    return Candidates(
+        reported[allowed], forces, None if place is None else place[allowed]
+    )
+
+
+def _find_measurable(
+    setup: SetUp, robot: Robot, angles: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Find configurations in which a set-up can measure near random ones (N, n).
+
+    Returns angles (M, n) of the chain, rad, and the place (M,) that is measured in each.
+
+    Raises `InputError`: there are none at some place.
+    """
+    place = np.arange(len(angles)) % len(setup.places)
+    moved, checks = reach_places(setup, robot, angles, place)
+    is_measurable = np.all(list(checks.values()), axis=0)
+    for index, name in enumerate(setup.places):
+        of_place = place == index
+        if not is_measurable[of_place].any():
+            strictest = min(checks, key=lambda check: checks[check][of_place].mean())
+            total = format_count(int(of_place.sum()), "configuration")
+            raise InputError(
+                "plan",
+                f"--place {name}",
+                f"none of {total}: {strictest}",
+                "another place",
+            )
+    return moved[is_measurable], place[is_measurable]
 
 
 def choose_plan(
@@ -155,7 +194,9 @@ def choose_plan(
     stream = np.random.default_rng(seed)
     owners = [owner for owner, _ in list_parameters(*declare_model(survey))]
     _check_counts(survey, len(owners), count, poses, held_out)
-    rows = compute_information_rows(survey, candidates.joint_angles, candidates.force)
+    rows = compute_information_rows(
+        survey, candidates.joint_angles, candidates.force, candidates.place
+    )
     _check_sensitivity(rows, owners)
     workspace = candidates.select(stream.permutation(count)[:_WORKSPACE])
     accuracy_rows = compute_accuracy_rows(

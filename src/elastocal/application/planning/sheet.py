@@ -10,6 +10,7 @@ import pandas as pd
 
 from elastocal.campaigns.campaign import GEOMETRY
 from elastocal.campaigns.measurements import DISPLAY_UNITS, TICK_COLUMN
+from elastocal.measuring.catalogue import list_kinds
 from elastocal.mechanics.components import WRENCH_NAMES
 
 if TYPE_CHECKING:
@@ -31,9 +32,10 @@ def build_sheet(survey: Survey, plan: Plan) -> pd.DataFrame:
     Returns
     -------
     Columns ``pose`` (fitted ones first, from 1), ``load`` (0 without), ``repeat``,
-    ``target``, ``done``, empty, ``q1_deg..qn_deg`` (``_mm`` of prismatic joints) as the
-    controller shows them, ``q1..qn`` the same in rad (m), wrench (N, N m), and ``x, y,
-    z`` and ``rx, ry, rz``, empty.
+    ``target``, ``feature`` if the kind has features, ``done``, empty, ``q1_deg..qn_deg``
+    (``_mm`` of prismatic joints) as the controller shows them, ``q1..qn`` the same in
+    rad (m), wrench (N, N m) for a tracker, and the columns of the kind, empty. A contact
+    has no repeats, because each has joint angles of its own.
     """
     rows = []
     joint_angles = np.concatenate(
@@ -41,12 +43,19 @@ def build_sheet(survey: Survey, plan: Plan) -> pd.DataFrame:
     )
     forces = np.concatenate([plan.fitted.force, plan.held_out.force])
     repeated = min(REPEATED_POSES, len(plan.fitted.joint_angles))
+    kind = list_kinds()[survey.measured]
+    if kind.is_contact:
+        repeated = 0
+    features = _name_features(survey, plan)
     for pose, (angles, force) in enumerate(zip(joint_angles, forces, strict=True), 1):
         joint_cells = _format_joints(survey, angles)
+        feature_cells = {"feature": features[pose - 1]} if features else {}
         for repeat in range(REPEATS if pose <= repeated else 1):
             shares = survey.shares[:2] if repeat else survey.shares
             for load, share in enumerate(shares):
-                wrench_cells = _format_wrench(share, force)
+                wrench_cells = {}
+                if survey.setup is None:
+                    wrench_cells = _format_wrench(share, force)
                 for target in survey.targets:
                     rows.append(
                         {
@@ -54,15 +63,36 @@ def build_sheet(survey: Survey, plan: Plan) -> pd.DataFrame:
                             "load": load,
                             "repeat": repeat,
                             "target": target.name,
+                            **feature_cells,
                             TICK_COLUMN: "",
                             **joint_cells,
                             **wrench_cells,
                         }
                     )
-    empty = ["x", "y", "z"]
-    if survey.measured == "pose":
-        empty += ["rx", "ry", "rz"]
+    # A row of a contact has no numbers but the joint angles.
+    empty = () if kind.is_contact else kind.columns
     return pd.DataFrame(rows).assign(**dict.fromkeys(empty, np.nan))
+
+
+def _name_features(survey: Survey, plan: Plan) -> list[str]:
+    """Name the feature that is measured in each pose; empty if there are none."""
+    setup = survey.setup
+    if setup is None or not setup.has_features:
+        return []
+    assert plan.fitted.place is not None
+    assert plan.held_out.place is not None
+    names = list(setup.places)
+    indices = np.concatenate([plan.fitted.place, plan.held_out.place]).tolist()
+    return [names[index] for index in indices]
+
+
+def clear_joint_angles(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of a sheet with columns of joint angles to be filled in, because
+    only those of the contact count."""
+    planned = [name for name in map(str, table) if name.startswith("q")]
+    displayed = [name for name in planned if "_" in name]
+    exact = [name for name in planned if "_" not in name]
+    return table.drop(columns=displayed).assign(**dict.fromkeys(exact, np.nan))
 
 
 def _format_joints(survey: Survey, angles: np.ndarray) -> dict[str, float]:
@@ -105,10 +135,7 @@ def build_campaign_document(
         if target.offset_m is not None:
             described["offset_std_m"] = target.offset_std_m
         targets[target.name] = described
-    noise = {"position_m": survey.position_m}
-    if survey.measured == "pose":
-        noise["orientation_rad"] = survey.orientation_rad
-    return {
+    document: dict[str, Any] = {
         "campaign": name,
         "robot": robot_file,
         "measured": survey.measured,
@@ -116,6 +143,31 @@ def build_campaign_document(
         "targets": targets,
         "compliance": "identify" if survey.loaded else "nominal",
         "declared": list(GEOMETRY),
-        "noise": noise,
-        "holdout": {"poses": list(range(fitted + 1, fitted + held_out + 1))},
     }
+    # The noise of a camera depends on the pose and is estimated.
+    if survey.setup is None or survey.setup.has_features:
+        noise = {"position_m": survey.position_m}
+        if survey.rows == 6:
+            noise["orientation_rad"] = survey.orientation_rad
+        document["noise"] = noise
+    document["holdout"] = {"poses": list(range(fitted + 1, fitted + held_out + 1))}
+    return document | _describe_setup(survey)
+
+
+def _describe_setup(survey: Survey) -> dict[str, Any]:
+    """Describe features, or the mounting of a camera, as campaign.yaml does."""
+    setup = survey.setup
+    if setup is None:
+        return {}
+    if not setup.has_features:
+        (target,) = survey.targets
+        unknown = {"point": target.point, "offset_m": "unknown", "rotation": "unknown"}
+        return {
+            "camera": setup.options["camera"],
+            "frame": "unknown",
+            "targets": {target.name: unknown},
+        }
+    features = {
+        name: setup.kind.state_place(place) for name, place in setup.places.items()
+    }
+    return {"features": features}

@@ -6,19 +6,12 @@ of the links, joint compliances if loads are measured, errors of declared masses
 placement of base and targets if they are unknown. Sensitivities are those of the fit
 itself, at the values of the robot file.
 
-Standard deviations of a sensor are half of the largest error that its maker permits,
-which a tracker's manual calls typical [1]; the angles of its probe are from [2].
-
-[1] Hexagon, Leica Absolute Tracker AT500 User Manual, section 2.8: transverse error at
-most 15 um + 6 um/m, typical results half of that.
-[2] Hexagon, data sheet of the Leica T-Mac: rotation angles to 0.01 deg, which is 18 um
-at 100 mm.
+Without a tracker, where features are is unknown too, and is fitted with the robot.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,49 +37,22 @@ from elastocal.fitting.model import (
 )
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import Observations, States
+from elastocal.fitting.sensor_noise import ShapedNoise, compute_sensor_roots
+from elastocal.measuring.catalogue import list_kinds
+from elastocal.measuring.channels import parse_measuring
 from elastocal.mechanics.sites import build_sites
 
 if TYPE_CHECKING:
+    from elastocal.application.calibrated import CalibratedRobot
+    from elastocal.application.planning.reaching import SetUp
     from elastocal.campaigns.campaign import Target
     from elastocal.effects.protocol import Parameter
+    from elastocal.measuring.channels import MeasuringPlan
     from elastocal.mechanics.robot import Robot
 
 # States that are linearized at once, so that their Jacobians stay in the processor's
 # cache.
 _CHUNK = 1000
-# Half of 15 um + 6 um/m at 7.5 m.
-_TRACKER_M = 30e-6
-_TRACKER = "half of MPE 15 µm + 6 µm/m"
-
-
-@dataclass(frozen=True)
-class Sensor:
-    """A measuring instrument.
-
-    Attributes
-    ----------
-    description : the instrument, and where its noise is from.
-    position_m, orientation_rad : standard deviation of a coordinate and of an angle.
-    """
-
-    description: str
-    position_m: float
-    orientation_rad: float
-
-
-# The usual sensor for each kind of measurement.
-SENSORS = {
-    "position": Sensor(
-        f"laser tracker and reflector at 7.5 m, {_TRACKER} (Leica AT500)",
-        _TRACKER_M,
-        0.0,
-    ),
-    "pose": Sensor(
-        f"laser tracker and 6DoF probe, {_TRACKER} at 7.5 m and of 0.01° (Leica T-Mac)",
-        _TRACKER_M,
-        math.radians(0.005),
-    ),
-}
 
 
 @dataclass(frozen=True)
@@ -98,10 +64,11 @@ class Survey:
     robot : the robot.
     targets : all of them are measured under each load.
     unknown_base : whether the tracker's frame is fitted.
-    measured : "position" or "pose".
+    measured : name of the kind of measurement.
     position_m, orientation_rad : standard deviation of each component of a measurement.
     force_N : force of the load, 0 for none.
     pulled : whether the load pulls in any direction; else it is a hanging weight.
+    setup : what measures the robot if it is no tracker; None for a tracker.
     """
 
     robot: Robot
@@ -112,11 +79,25 @@ class Survey:
     orientation_rad: float
     force_N: float = 0.0
     pulled: bool = False
+    setup: SetUp | None = None
 
     @property
     def rows(self) -> int:
         """Numbers in a measurement of one target."""
-        return 6 if self.measured == "pose" else 3
+        return list_kinds()[self.measured].numbers
+
+    @property
+    def plan(self) -> MeasuringPlan | None:
+        """Kinds, features and channels as a campaign of this survey has them; None if
+        rows refer to no feature."""
+        if self.setup is None or not self.setup.has_features:
+            return None
+        features = {
+            name: {"kind": self.measured, **self.setup.kind.state_place(place)}
+            for name, place in self.setup.places.items()
+        }
+        document = {"measured": self.measured, "frame": BASE, "features": features}
+        return parse_measuring(document, "--place")
 
     @property
     def shares(self) -> tuple[float, ...]:
@@ -143,7 +124,7 @@ class Survey:
     @property
     def frame(self) -> str:
         """Frame in which the accuracy is stated, a key of `frames.FRAMES`."""
-        return ROBOT if self.unknown_base else BASE
+        return ROBOT if self.unknown_base or self.setup else BASE
 
     @property
     def offset_removed(self) -> bool:
@@ -180,6 +161,8 @@ def declare_model(survey: Survey) -> tuple[Model, Estimate]:
         survey.rows,
         robot.compliance,
         effects,
+        measuring=survey.plan,
+        shaped_noise=_shape_noise(survey),
     )
     coefficients = []
     for effect in effects:
@@ -196,11 +179,49 @@ def declare_model(survey: Survey) -> tuple[Model, Estimate]:
         tuple(coefficients),
         tuple(np.zeros(0) for _ in effects),
     )
+    if survey.setup is not None:
+        estimate = _place_setup(survey.setup, estimate)
     return model, estimate
 
 
+def _place_setup(setup: SetUp, estimate: Estimate) -> Estimate:
+    """Place target, frame of the session and features where they roughly are."""
+    origin, axes = setup.locate_session()
+    values: tuple[np.ndarray, ...] = ()
+    if setup.has_features:
+        values = tuple(map(setup.kind.convert_place, setup.places.values()))
+    return replace(
+        estimate,
+        frame_rotation=axes.T[None],
+        frame_position=-(axes.T @ origin)[None],
+        target_offset=setup.mount_m[None],
+        target_rotation=setup.mount_rotation[None],
+        features=values,
+    )
+
+
+def _shape_noise(survey: Survey) -> ShapedNoise | None:
+    """Shape the noise of a kind that says how it depends on the pose, in groups of errors
+    with the standard deviation of a coordinate or of a rotation."""
+    setup = survey.setup
+    if setup is None or setup.has_features:
+        return None
+    somewhere = np.ones((1, 3)), np.eye(3)[None]
+    shape = setup.kind.shape_noise(*somewhere, setup.options)
+    if shape is None:
+        return None
+    factors = np.full(shape.groups.max() + 1, survey.orientation_rad)
+    factors[shape.groups[:3]] = survey.position_m
+    camera = setup.options.get("camera", "")
+    range_m = setup.options.get("range_m")
+    return ShapedNoise(setup.kind, camera, factors, survey.position_m, range_m)
+
+
 def compute_information_rows(
-    survey: Survey, reported_angles: np.ndarray, force: np.ndarray
+    survey: Survey,
+    reported_angles: np.ndarray,
+    force: np.ndarray,
+    place: np.ndarray | None = None,
 ) -> np.ndarray:
     """Compute the whitened sensitivities of the measurements in each configuration.
 
@@ -209,6 +230,7 @@ def compute_information_rows(
     survey : what is measured.
     reported_angles : (N, n) joint angles as the controller reports them, rad.
     force : (N, 3) full load at the last measuring point, N, base axes.
+    place : (N,) int, place of the set-up that is measured; None for a tracker.
 
     Returns
     -------
@@ -220,17 +242,38 @@ def compute_information_rows(
     plausible = [
         parameter.plausible for _, parameter in list_parameters(model, estimate)
     ]
-    std = np.repeat([survey.position_m, survey.orientation_rad], 3)[: survey.rows]
-    scale = np.array(plausible) / std[:, None]
+    noise = _state_noise(survey)
     count = len(reported_angles)
     rows = np.empty((count, survey.numbers, len(plausible)))
     for chunk in split_into_chunks(count, max(_CHUNK // len(survey.shares), 1)):
-        observations = build_observations(survey, reported_angles[chunk], force[chunk])
+        observations = build_observations(
+            survey,
+            reported_angles[chunk],
+            force[chunk],
+            None if place is None else place[chunk],
+        )
         around = evaluate_conditions(model, estimate, observations.states)
         linearization = linearize(model, estimate, observations, around)
-        scaled = linearization.sensitivities * scale
+        roots = compute_sensor_roots(model, estimate, observations, noise)
+        if roots is None:
+            whitened = (
+                linearization.sensitivities / noise.sensor_std(survey.rows)[:, None]
+            )
+        else:
+            whitened = np.linalg.solve(roots, linearization.sensitivities)
+        scaled = whitened * plausible
         rows[chunk] = scaled.reshape(-1, survey.numbers, len(plausible))
     return rows
+
+
+def _state_noise(survey: Survey) -> Noise:
+    """State the noise of the sensor; joints repeat exactly."""
+    return Noise(
+        "declared",
+        survey.position_m,
+        survey.orientation_rad,
+        np.zeros(survey.robot.joints),
+    )
 
 
 def compute_accuracy_rows(
@@ -258,24 +301,11 @@ def compute_accuracy_rows(
     -------
     (N, 3, P) derivatives by the parameters in units of their plausible sizes, m.
     """
-    robot = survey.robot
-    model, estimate = declare_model(survey)
-    parameters = list_parameters(model, estimate)
-    calibrated = calibrate_by_model(
-        robot,
-        model,
-        estimate,
-        np.zeros((len(parameters), len(parameters))),
-        Noise(
-            "declared",
-            survey.position_m,
-            survey.orientation_rad,
-            np.zeros(robot.joints),
-        ),
-    )
+    calibrated = _calibrate_exactly(survey)
+    parameters = list_parameters(*declare_model(survey))
     wrench = np.hstack([force, np.zeros_like(force)])
     sensitivities = compute_pose_sensitivities(calibrated, reported_angles, wrench)
-    position, rotation = compute_nominal_poses(robot, reported_angles)
+    position, rotation = compute_nominal_poses(survey.robot, reported_angles)
     if offset_removed is None:
         offset_removed = survey.offset_removed
     scope = Scope(survey.frame, position.mean(axis=0), offset_removed=offset_removed)
@@ -296,31 +326,65 @@ def _find_commanded(
     return np.array([owner in effects for owner, _ in parameters])
 
 
+def _calibrate_exactly(survey: Survey) -> CalibratedRobot:
+    """Build the robot of the robot file, without errors, as a calibrated one."""
+    model, estimate = declare_model(survey)
+    # A robot that is corrected needs no features.
+    model = replace(model, measuring=None, shaped_noise=None)
+    count = len(list_parameters(model, estimate))
+    covariance = np.zeros((count, count))
+    return calibrate_by_model(
+        survey.robot, model, estimate, covariance, _state_noise(survey)
+    )
+
+
 def build_observations(
-    survey: Survey, reported_angles: np.ndarray, force: np.ndarray
+    survey: Survey,
+    reported_angles: np.ndarray,
+    force: np.ndarray,
+    place: np.ndarray | None = None,
 ) -> Observations:
     """Build observations without measured values: every target under every share of the
     load of each configuration, in this order.
 
     Arguments as in `compute_information_rows`.
     """
-    loads = len(survey.shares)
+    states = _build_states(survey, reported_angles, force)
+    count = len(states.pose)
     targets = len(survey.targets)
-    angles = np.repeat(survey.robot.model_angles(reported_angles), loads, axis=0)
-    count = len(angles)
-    shares = np.array(survey.shares)[:, None]
-    wrench = np.zeros((count, 6))
-    wrench[:, :3] = (force[:, None] * shares).reshape(-1, 3)
-    zeros = np.zeros(count, int)
-    pose = np.arange(count) // loads
-    load = np.arange(count) % loads
-    states = States(zeros, pose, load, angles, wrench, zeros + 1)
     state = np.repeat(np.arange(count), targets)
+    position = np.zeros((len(state), min(survey.rows, 3)))
     rotation = np.broadcast_to(np.eye(3), (len(state), 3, 3))
+    channel = None
+    if survey.setup is not None:
+        # A channel is one place, because all rows have the numbers of one kind.
+        if survey.setup.has_features:
+            channel = place
+        else:
+            position, rotation, _ = survey.setup.locate_targets(
+                survey.robot, states.joint_angles
+            )
     return Observations(
         states,
         state,
         np.tile(np.arange(targets), count),
-        np.zeros((len(state), 3)),
+        position,
         rotation if survey.rows == 6 else None,
+        channel,
     )
+
+
+def _build_states(
+    survey: Survey, reported_angles: np.ndarray, force: np.ndarray
+) -> States:
+    """Build the states of each configuration under every share of the load."""
+    loads = len(survey.shares)
+    angles = np.repeat(survey.robot.model_angles(reported_angles), loads, axis=0)
+    count = len(angles)
+    wrench = np.zeros((count, 6))
+    shares = np.array(survey.shares)[:, None]
+    wrench[:, :3] = (force[:, None] * shares).reshape(-1, 3)
+    zeros = np.zeros(count, int)
+    pose = np.arange(count) // loads
+    load = np.arange(count) % loads
+    return States(zeros, pose, load, angles, wrench, zeros + 1)
