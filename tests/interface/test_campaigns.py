@@ -99,6 +99,11 @@ def test_folder_is_read_with_a_robot_of_the_project(tmp_path, kuka):
         ({"remainder": "magic"}, "remainder: found 'magic'"),
         ({"columns": {"colour": np.zeros(60)}}, "columns: found 'colour'"),
         ({"no_such_key": 1}, "no_such_key"),
+        (
+            {"joint_angles": np.zeros((0, 6)), "positions": np.zeros((0, 3))},
+            "positions",
+        ),
+        ({"positions": np.full((60, 3), np.nan)}, "found no measured position"),
     ],
 )
 def test_a_wrong_argument_is_named_in_one_line(nominal, measured, change, message):
@@ -110,6 +115,31 @@ def test_a_wrong_argument_is_named_in_one_line(nominal, measured, change, messag
         ec.Campaign(nominal, **(arguments | change))
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("robot", ["arm.urdf", None])
+def test_what_is_no_robot_makes_no_campaign(robot, measured):
+    for make in (
+        lambda: ec.Campaign(robot, joint_angles=[[0.0]], positions=[[0.0] * 3]),
+        lambda: ec.Campaign.from_table(robot, measured),
+    ):
+        with pytest.raises(ec.InputError, match=r"robot: found .* allowed: a Robot"):
+            make()
+
+
+def test_a_force_along_one_axis_is_a_load(nominal, measured):
+    """Columns of a load that the table lacks are zero; none is left out."""
+    columns = [*(f"q{joint}" for joint in range(1, 7)), *"xyz"]
+    table = measured[columns].assign(fz=-100.0)
+    wrench = ec.Campaign.from_table(nominal, table).checked.measurements.wrench
+    np.testing.assert_array_equal(wrench, [[0, 0, -100, 0, 0, 0]] * len(table))
+
+
+def test_a_part_of_an_orientation_is_refused(nominal, measured):
+    with pytest.raises(ec.InputError, match="table: found no column 'rx'"):
+        ec.Campaign.from_table(nominal, measured.assign(ry=0.0))
+    with pytest.raises(ec.InputError, match="a DataFrame of pandas"):
+        ec.Campaign.from_table(nominal, {"q1": [0.0]})
 
 
 def test_a_wrong_value_is_named_by_argument_and_row(nominal, measured):

@@ -34,6 +34,11 @@ def test_page_escapes_names_of_campaigns(result):
     assert "<script>" not in page
 
 
+def test_what_is_no_diagnosis_is_refused(result):
+    with pytest.raises(ec.InputError, match="diagnoses: found 'reports/loop/cell'"):
+        ec.compare(result, "reports/loop/cell")
+
+
 def test_a_single_diagnosis_is_refused(result):
     with pytest.raises(ec.InputError, match="found 1; allowed: two or more"):
         ec.compare(result)

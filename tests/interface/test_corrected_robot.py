@@ -93,6 +93,62 @@ def test_a_wrong_path_is_refused_in_one_line(result, table, message):
         result.robot.correct(table)
 
 
+@pytest.mark.parametrize("seed", ["a", -1])
+def test_a_wrong_seed_is_refused(campaign, seed):
+    with pytest.raises(ec.InputError, match="diagnose: seed"):
+        ec.diagnose(campaign, seed=seed)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda robot, path: robot.correct(None), "correct: path"),
+        (lambda robot, path: robot.correct(path[:0]), "path: found no row"),
+        (lambda robot, path: robot.correct(path.assign(x="a")), "path: x..rz"),
+        (lambda robot, path: robot.correct(path.drop(columns="q2")), "no column 'q2'"),
+        (lambda robot, path: robot.certify("0.2mm"), "certify: tolerance_m"),
+        (lambda robot, path: ec.certify(path, 1e-3), "certify: robot"),
+        (lambda robot, path: robot.verify(None, np.zeros((6, 3))), "verify: targets"),
+        (lambda robot, path: ec.verify(None, path, path), "verify: robot"),
+        (lambda robot, path: ec.read_model("no.json"), "no.json: found no such file"),
+        (lambda robot, path: ec.read_verdict("no.json"), "no.json: found no such file"),
+    ],
+)
+def test_a_wrong_argument_is_named(result, nominal, commands, call, message):
+    with pytest.raises(ec.InputError) as caught:
+        call(result.robot, wanted_poses(nominal, commands))
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_force_along_one_axis_is_a_load(result, nominal, commands):
+    path = wanted_poses(nominal, commands).assign(fz=-50.0)
+    wrench = result.robot.correct(path).wrench
+    np.testing.assert_array_equal(wrench, [[0, 0, -50, 0, 0, 0]] * len(path))
+
+
+def test_robot_path_and_verification_are_shown_in_a_line(result, nominal, commands):
+    """Wanted positions in place of measured ones: errors of zero, without any noise."""
+    path = wanted_poses(nominal, commands)
+    corrected = result.robot.correct(path)
+    verified = result.robot.verify(corrected, path[[*"xyz"]])
+    for shown, start in (
+        (result.robot, "<CorrectedRobot test arm: joint_offset; predicted error 0."),
+        (corrected, "<CorrectedPath: 6 targets; predicted position error "),
+        (verified, "<Verification of 6 targets: RMS position error before "),
+    ):
+        assert str(shown).startswith(start)
+        assert "\n" not in str(shown)
+    assert "measured 0.000 mm; the prediction held" in str(verified)
+
+
+def test_a_folder_that_is_missing_is_named_with_the_file(result, tmp_path):
+    path = tmp_path / "none" / "arm.json"
+    with pytest.raises(FileNotFoundError) as caught:
+        result.robot.save(path)
+    assert str(caught.value).endswith(f"'{path}'")
+
+
 def test_commands_of_another_number_of_joints_are_refused(result):
     with pytest.raises(ec.InputError, match="joint_angles"):
         result.robot.predict(np.zeros((2, 5)))

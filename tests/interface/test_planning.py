@@ -33,3 +33,26 @@ def test_check_says_what_can_be_tested(campaign):
     overview = ec.check(campaign)
     assert overview.diagnosable
     assert overview.testable > 10
+    first, *others = str(overview).splitlines()
+    assert first.startswith("campaign can be diagnosed: ")
+    assert len(others) == len(overview.attention)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda robot: ec.plan("arm.urdf"), "plan: robot"),
+        (lambda robot: ec.plan(robot, poses=20.5), "plan: poses"),
+        (lambda robot: ec.plan(robot, held_out=-1), "plan: held_out"),
+        (lambda robot: ec.simulate(None), "simulate: robot"),
+        (lambda robot: ec.simulate(robot, poses=0), "simulate: poses"),
+        (lambda robot: ec.simulate(robot, noise_m=-1e-5), "simulate: noise_m"),
+        (lambda robot: ec.check("campaigns/cell"), "check: campaign"),
+        (lambda robot: ec.diagnose("campaigns/cell"), "diagnose: campaign"),
+    ],
+)
+def test_a_wrong_argument_is_refused_by_its_name(nominal, call, message):
+    with pytest.raises(ec.InputError) as caught:
+        call(nominal)
+    assert str(caught.value).startswith(message)
+    assert "\n" not in str(caught.value)

@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -61,7 +62,6 @@ from elastocal.verdict import RegressionChoice, Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
-    from pathlib import Path
 
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.effects.protocol import Candidate, Parameter, Shape
@@ -472,6 +472,8 @@ def read_model_file(path: str | Path) -> ModelFile:
     InputError
         It is no model file, or one of a later version, or was changed by hand.
     """
+    if not Path(path).exists():
+        raise InputError(path, "", "no such file", _WRITTEN_BY)
     size = check_file(path, _WRITTEN_BY)
     if size > _LARGEST_BYTES:
         allowed = f"at most {_LARGEST_BYTES // 1_000_000} MB"

@@ -108,6 +108,14 @@ class CorrectedPath:
     status: np.ndarray
     large_steps: list[LargeStep]
 
+    def __repr__(self) -> str:
+        before = format_millimetres(root_mean_square(self.uncorrected_error_m))
+        after = format_millimetres(root_mean_square(self.prediction.error_m))
+        return (
+            f"<CorrectedPath: {len(self.status)} targets; predicted position error"
+            f" {before} RMS before the correction, {after} after>"
+        )
+
     @property
     def has_bound(self) -> np.ndarray:
         """(N,) bool, targets with an error bound."""

@@ -378,7 +378,8 @@ def draw_measured_rms(
         of_robot**2 / configurations + by_noise * (by_noise + 2.0 * of_robot) / count
     )
     variance = max(normal, _compute_ratio_variance(errors, configuration))
-    dof = 2.0 * total**2 / variance if variance else np.inf
+    # Errors far below the noise would have hardly any degree of freedom.
+    dof = max(2.0 * total**2 / variance, 1.0) if variance else np.inf
     scale = np.ones(_DRAWS)
     if np.isfinite(dof):
         scale = dof / stream.chisquare(dof, _DRAWS)

@@ -127,18 +127,13 @@ def check(folder: Annotated[Path, Argument(help="Folder of the campaign.")]) -> 
     # The next command is `diagnose`, which refuses such a path.
     check_workflow_path(str(folder.resolve()))
     report = inspect_campaign(folder, find_robots_folder())
+    next_step = "mend the data, then check again"
     if report.diagnosable:
-        testable = format_count(report.testable, "candidate effect")
-        answer = f"{report.campaign} can be diagnosed: {testable} can be tested"
-        if report.attention:
-            answer += f"; {format_count(len(report.attention), 'remark')} below"
         next_step = format_command("diagnose", folder)
-    else:
-        answer = f"{report.campaign} cannot be diagnosed: the data are at fault"
-        next_step = "mend the data, then check again"
     details = [f"{name:<16}{sentence}" for name, sentence in report.rows]
     details += [f"! {sentence}" for sentence in report.attention]
-    print_answer(answer, details, next_step, Console(), passed=report.diagnosable)
+    passed = report.diagnosable
+    print_answer(report.answer, details, next_step, Console(), passed=passed)
     raise typer.Exit(0 if report.diagnosable else 1)
 
 

@@ -20,7 +20,7 @@ from elastocal.errors import InputError, suggest_names
 from elastocal.exchange.numbering import number_loads_and_repeats, number_poses
 from elastocal.fitting.cases import prepare_case
 from elastocal.fitting.model import Case
-from elastocal.interface.arrays import check_array
+from elastocal.interface.arguments import check_array, check_instance
 from elastocal.io.documents import check_document
 from elastocal.loop.loading import (
     check_regression,
@@ -28,6 +28,7 @@ from elastocal.loop.loading import (
     read_described_campaign,
 )
 from elastocal.mechanics.components import WRENCH_NAMES
+from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import describe_robot
 
 if TYPE_CHECKING:
@@ -37,11 +38,12 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from elastocal.campaigns import campaign as campaigns
-    from elastocal.mechanics.robot import Robot
 
 _SOURCE = "Campaign"
 # The target of a campaign that names none.
 _TARGET = "target"
+ROBOT_ALLOWED = "a Robot, which ec.read_robot returns"
+CAMPAIGN_ALLOWED = "a Campaign, such as ec.read_campaign returns"
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -122,6 +124,7 @@ class Campaign:
         >>> ec.Campaign(robot, joint_angles=q, positions=x, frame="base")
         <Campaign campaign of robot: 20 measurements of 1 target(s) at 20 poses>
         """
+        check_instance(_SOURCE, "robot", robot, Robot, ROBOT_ALLOWED)
         is_pose = rotation_vectors is not None
         has_loads = wrenches is not None and bool(np.any(wrenches))
         document = _complete_settings(
@@ -147,16 +150,26 @@ class Campaign:
         robot : Robot
             The nominal robot.
         table : DataFrame
-            Columns ``q1..qn`` and ``x, y, z``; optionally ``rx, ry, rz``, ``fx..mz``
-            and the others of measurements.csv.
+            Columns ``q1..qn`` and ``x, y, z``; optionally ``rx, ry, rz``, ``fx..mz``,
+            of which missing ones are zero, and the others of measurements.csv.
         **settings
             As of `Campaign`.
         """
+        import pandas as pd
+
+        check_instance(_SOURCE, "robot", robot, Robot, ROBOT_ALLOWED)
+        check_instance(_SOURCE, "table", table, pd.DataFrame, "a DataFrame of pandas")
         angles = _name_angles(robot)
-        missing = [name for name in (*angles, *"xyz") if name not in table]
+        needed = [*angles, *"xyz"]
+        if any(name in table for name in ROTATION):
+            needed += ROTATION
+        missing = [name for name in needed if name not in table]
         if missing:
-            allowed = f"a table with {', '.join(angles)}, x, y and z"
+            allowed = f"a table with {', '.join(needed)}"
             raise InputError(_SOURCE, "table", f"no column {missing[0]!r}", allowed)
+        if any(name in table for name in WRENCH_NAMES):
+            absent = [name for name in WRENCH_NAMES if name not in table]
+            table = table.assign(**dict.fromkeys(absent, 0.0))
         groups = {
             "joint_angles": angles,
             "positions": [*"xyz"],
@@ -295,6 +308,8 @@ def _arrange(
     count = len(angles)
     positions = _check_targets("positions", arrays["positions"], count, targets)
     row, target = np.nonzero(~np.isnan(positions).all(axis=2))
+    if not len(row):
+        raise InputError(_SOURCE, "positions", "no measured position", "one or more")
     values = _name_columns(_name_angles(robot), angles[row])
     values |= _name_columns("xyz", positions[row, target])
     if arrays["rotation_vectors"] is not None:

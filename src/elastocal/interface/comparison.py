@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 
 from elastocal.counting import format_digits
 from elastocal.errors import InputError
+from elastocal.interface.arguments import check_instance
 from elastocal.interface.diagnoses import DiagnosisResult
+from elastocal.verdict import Verdict
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from elastocal.verdict import EffectParameter, Verdict
+    from elastocal.verdict import EffectParameter
 
 _PAGE = """<!DOCTYPE html>
 <html lang="en">
@@ -68,6 +70,10 @@ def compare(*diagnoses: DiagnosisResult | Verdict) -> Comparison:
 
     if len(diagnoses) < 2:
         raise InputError("compare", "diagnoses", str(len(diagnoses)), "two or more")
+    allowed = "results of ec.diagnose, or verdicts that ec.read_verdict returns"
+    for diagnosis in diagnoses:
+        kinds = (DiagnosisResult, Verdict)
+        check_instance("compare", "diagnoses", diagnosis, kinds, allowed)
     verdicts = [
         diagnosis.verdict if isinstance(diagnosis, DiagnosisResult) else diagnosis
         for diagnosis in diagnoses

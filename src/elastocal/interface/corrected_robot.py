@@ -23,6 +23,7 @@ from elastocal.application.model_file import (
     write_model,
 )
 from elastocal.application.path_correction import CorrectedPath, correct_path
+from elastocal.application.statements import format_millimetres
 from elastocal.campaigns.measurements import ROTATION
 from elastocal.errors import InputError
 from elastocal.exchange.makers_kinematics import (
@@ -42,7 +43,7 @@ from elastocal.exchange.target_path import (
     read_target_path_for,
 )
 from elastocal.exchange.urdf_writing import build_urdf, write_calibrated_origins
-from elastocal.interface.arrays import check_array
+from elastocal.interface.arguments import check_array, check_instance, check_size
 from elastocal.io.atomic_writes import write_atomically, write_text
 from elastocal.loop.calibrated_files import decide_on_campaign
 from elastocal.loop.verification import (
@@ -65,6 +66,10 @@ if TYPE_CHECKING:
 _SOURCE = "CorrectedRobot"
 # Upper bound on a tolerance: a larger one is in millimetres.
 _LARGEST_TOLERANCE_M = 0.05
+_TARGETS_ALLOWED = (
+    "a result of CorrectedRobot.correct, or the file of elastocal correct"
+)
+_ROBOT_ALLOWED = "a CorrectedRobot, such as result.robot or ec.read_model returns"
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +86,16 @@ class CorrectedRobot:
 
     calibrated: CalibratedRobot = field(repr=False)
     verdict: Verdict = field(repr=False)
+
+    def __repr__(self) -> str:
+        effects = ", ".join(effect.name for effect in self.verdict.missing_effects)
+        text = f"<CorrectedRobot {self.nominal.name}: {effects or 'no effect'}"
+        accuracy = self.verdict.accuracy
+        if accuracy is not None:
+            predicted = format_millimetres(accuracy.rms_m)
+            bound = format_millimetres(accuracy.rms_bound_m)
+            text += f"; predicted error {predicted} RMS, 95 % bound {bound}"
+        return f"{text}>"
 
     @property
     def nominal(self) -> Robot:
@@ -216,6 +231,8 @@ class CorrectedRobot:
             _check_tolerance("verify", tolerance_m, accepted_risk)
         campaign_targets = [*get_targets(self.calibrated).values()]
         reflectors = list_reflectors(campaign_targets, self.nominal, "verify")
+        kinds = (CorrectedPath, str, Path)
+        check_instance("verify", "targets", targets, kinds, _TARGETS_ALLOWED)
         joints = self.nominal.commands
         if isinstance(targets, (str, Path)):
             corrected = read_corrected_targets(targets, joints)
@@ -349,6 +366,7 @@ def certify(
     robot: CorrectedRobot, tolerance_m: float, accepted_risk: float = 0.05
 ) -> Conformity:
     """Decide whether a corrected robot keeps a tolerance, as `CorrectedRobot.certify`."""
+    check_instance("certify", "robot", robot, CorrectedRobot, _ROBOT_ALLOWED)
     return robot.certify(tolerance_m, accepted_risk)
 
 
@@ -362,12 +380,18 @@ def verify(
 ) -> Verification:
     """Compare a corrected robot, measured at its targets, with its prediction, as
     `CorrectedRobot.verify`."""
+    check_instance("verify", "robot", robot, CorrectedRobot, _ROBOT_ALLOWED)
     return robot.verify(
         targets, measured, tolerance_m=tolerance_m, accepted_risk=accepted_risk
     )
 
 
 def _check_tolerance(source: str, tolerance_m: float, accepted_risk: float) -> None:
+    for argument, value in (
+        ("tolerance_m", tolerance_m),
+        ("accepted_risk", accepted_risk),
+    ):
+        check_size(source, argument, value)
     if not 0.0 < tolerance_m < _LARGEST_TOLERANCE_M:
         allowed = f"a length in metres, below {_LARGEST_TOLERANCE_M:g} m"
         raise InputError(source, "tolerance_m", repr(tolerance_m), allowed)
@@ -377,16 +401,26 @@ def _check_tolerance(source: str, tolerance_m: float, accepted_risk: float) -> N
 
 
 def _arrange_path(table: pd.DataFrame, joints: int) -> TargetPath:
-    """Arrange a table of wanted poses."""
+    """Arrange a table of wanted poses. Missing columns of its loads are zero."""
+    import pandas as pd
+
+    check_instance("correct", "path", table, pd.DataFrame, "a DataFrame or a file")
     pose = [*"xyz", *ROTATION]
     angles = [f"q{joint}" for joint in range(1, joints + 1)]
-    missing = next((name for name in pose if name not in table), None)
+    has_angles = any(name in table for name in angles)
+    needed = pose + angles if has_angles else pose
+    missing = next((name for name in needed if name not in table), None)
     if missing is not None:
-        allowed = f"a table with {', '.join(pose)}"
+        allowed = f"a table with {', '.join(needed)}"
         raise InputError("path", "", f"no column {missing!r}", allowed)
+    if not len(table):
+        raise InputError("path", "", "no row", "a row for each wanted pose")
     wrench = None
-    if WRENCH_NAMES[0] in table:
+    if any(name in table for name in WRENCH_NAMES):
         loads = table.reindex(columns=[*WRENCH_NAMES], fill_value=0.0)
-        wrench = loads.to_numpy(float)
-    start = table[angles].to_numpy(float) if angles[0] in table else None
-    return build_target_path(table[pose].to_numpy(float), start, wrench)
+        wrench = check_array("path", "fx..mz", loads, (None, 6))
+    start = None
+    if has_angles:
+        start = check_array("path", "q1..qn", table[angles], (None, joints))
+    wanted = check_array("path", "x..rz", table[pose], (None, 6))
+    return build_target_path(wanted, start, wrench)

@@ -11,6 +11,8 @@ import numpy as np
 
 from elastocal.diagnosis.judge import generate_residual_blocks
 from elastocal.errors import explain_missing_packages
+from elastocal.interface.arguments import check_count, check_instance
+from elastocal.interface.campaigns import CAMPAIGN_ALLOWED, Campaign
 from elastocal.interface.corrected_robot import CorrectedRobot
 from elastocal.loop.diagnosis_tables import (
     diagnose_with_proposal,
@@ -29,7 +31,6 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.diagnose import Diagnosis
     from elastocal.diagnosis.judge import Judgement
     from elastocal.diagnosis.next_experiment import Table
-    from elastocal.interface.campaigns import Campaign
     from elastocal.interface.plots import Plots
     from elastocal.verdict import Effect, ErrorSummary, NoiseEstimate, Verdict
 
@@ -203,6 +204,9 @@ def diagnose(
     DiagnosisResult
         Verdict, errors before and after at held-out poses, and the corrected robot.
     """
+    check_instance("diagnose", "campaign", campaign, Campaign, CAMPAIGN_ALLOWED)
+    check_count("diagnose", "seed", seed, 0)
+    check_count("diagnose", "proposed_poses", proposed_poses, 1)
     fitted, held_out = campaign.split()
     training, experiment = diagnose_with_proposal(
         fitted, seed, proposed_poses, report_progress or _ignore

@@ -13,9 +13,11 @@ from elastocal.application.planning.survey import Survey
 from elastocal.campaigns.campaign import OFFSET_STD_M, Target
 from elastocal.campaigns.simulation import Plan as SimulatedPlan
 from elastocal.campaigns.simulation import draw_measurements
-from elastocal.interface.campaigns import Campaign
+from elastocal.interface.arguments import check_count, check_instance, check_size
+from elastocal.interface.campaigns import CAMPAIGN_ALLOWED, ROBOT_ALLOWED, Campaign
 from elastocal.loop.overview import Overview, inspect_case
 from elastocal.measuring.position import POSITION
+from elastocal.mechanics.robot import Robot
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -23,7 +25,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from elastocal.application.planning.plan import Plan
-    from elastocal.mechanics.robot import Robot
 
 # Number of random configurations from which a plan chooses, as of `elastocal plan`.
 _CANDIDATES = 10_000
@@ -98,6 +99,11 @@ def plan(
     InputError
         Names the argument, what was found and what is allowed.
     """
+    check_instance("plan", "robot", robot, Robot, ROBOT_ALLOWED)
+    check_count("plan", "poses", poses, 1)
+    check_count("plan", "held_out", held_out, 0)
+    check_count("plan", "seed", seed, 0)
+    check_size("plan", "force_N", force_N)
     sensor = POSITION.sensor
     end = robot.chain.end_effector.name
     tracked = tuple(
@@ -163,6 +169,12 @@ def simulate(
     """
     import pandas as pd
 
+    check_instance("simulate", "robot", robot, Robot, ROBOT_ALLOWED)
+    check_count("simulate", "poses", poses, 1)
+    check_count("simulate", "repeats", repeats, 1)
+    check_count("simulate", "seed", seed, 0)
+    check_size("simulate", "force_N", force_N)
+    check_size("simulate", "noise_m", noise_m)
     measured = SimulatedPlan(
         points=(robot.chain.end_effector.name,),
         poses=poses,
@@ -188,5 +200,6 @@ def check(campaign: Campaign) -> Overview:
     campaign : Campaign
         The measurements.
     """
+    check_instance("check", "campaign", campaign, Campaign, CAMPAIGN_ALLOWED)
     fitted, held_out = campaign.split()
     return inspect_case(fitted, held_out.campaign.measurements)

@@ -84,9 +84,12 @@ def write_atomically(path: str | Path, *, empty: bool = False) -> Iterator[str]:
     """
     check_places(path)
     partial = _partial_name(path)
-    os.close(
-        os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666)
-    )
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW
+    try:
+        os.close(os.open(partial, flags, 0o666))
+    except FileNotFoundError as error:
+        # The folder is missing. The user knows the name of the file alone.
+        raise FileNotFoundError(error.errno, error.strerror, str(path)) from None
     try:
         with _lock_while_writing(partial):
             yield partial

@@ -16,10 +16,14 @@ def read_json(path: str | Path) -> Any:
     An InputError refuses a file that is no JSON, or whose brackets are nested so deeply
     that no program of this project can have written it.
     """
-    check_file(path)
     try:
+        check_file(path)
         with open(path, encoding="utf-8") as file:
             return json.load(file)
+    except FileNotFoundError:
+        raise InputError(path, "", "no such file", "a file that is there") from None
+    except InputError:
+        raise
     except (ValueError, RecursionError) as error:
         raise InputError(
             path, "", f"no JSON ({error})", "the file as the pipeline wrote it"

@@ -90,6 +90,20 @@ class Overview:
     rows: list[tuple[str, str]]
     attention: list[str]
 
+    @property
+    def answer(self) -> str:
+        """Whether the campaign can be diagnosed, and how much of it can be tested."""
+        if not self.diagnosable:
+            return f"{self.campaign} cannot be diagnosed: the data are at fault"
+        testable = format_count(self.testable, "candidate effect")
+        answer = f"{self.campaign} can be diagnosed: {testable} can be tested"
+        if self.attention:
+            answer += f"; {format_count(len(self.attention), 'remark')} below"
+        return answer
+
+    def __str__(self) -> str:
+        return "\n".join([self.answer, *(f"! {line}" for line in self.attention)])
+
 
 def inspect_campaign(folder: str | Path, robots_folder: str | Path) -> Overview:
     """Inspect a campaign before its diagnosis.

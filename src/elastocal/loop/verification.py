@@ -14,6 +14,7 @@ import numpy as np
 from elastocal import __version__
 from elastocal.application.accuracy import predict_determined_rms_m
 from elastocal.application.frames import ROBOT, root_mean_square
+from elastocal.application.statements import format_millimetres
 from elastocal.application.verification import (
     CommandedTargets,
     add_noise_to_bound,
@@ -82,6 +83,17 @@ class Verification:
 
     document: dict[str, Any]
     table: pd.DataFrame
+
+    def __repr__(self) -> str:
+        errors = ", ".join(
+            f"{name} {format_millimetres(self.document[f'{name}_rms_m'])}"
+            for name in ("before", "predicted", "measured")
+        )
+        held = "held" if self.document["prediction"]["held"] else "did not hold"
+        return (
+            f"<Verification of {self.document['targets']} targets: RMS position error"
+            f" {errors}; the prediction {held}>"
+        )
 
 
 def read_verification(

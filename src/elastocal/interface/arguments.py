@@ -1,8 +1,10 @@
-"""Check arrays that a caller passes."""
+"""Check arguments that a caller passes. A wrong one is an InputError of one line."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from numbers import Integral, Real
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -41,3 +43,23 @@ def check_array(
         finding = f"an array of shape {array.shape}"
         raise InputError(source, argument, finding, f"an array of shape ({lengths})")
     return array
+
+
+def check_instance(
+    source: str, argument: str, value: Any, kinds: type | tuple[type, ...], allowed: str
+) -> None:
+    """Refuse an argument of another class; `allowed` says what to pass instead."""
+    if not isinstance(value, kinds):
+        raise InputError(source, argument, repr(value), allowed)
+
+
+def check_count(source: str, argument: str, value: Any, lowest: int) -> None:
+    """Refuse an argument that is no integer, or below the lowest one."""
+    if not isinstance(value, Integral) or value < lowest:
+        raise InputError(source, argument, repr(value), f"an integer, {lowest} or more")
+
+
+def check_size(source: str, argument: str, value: Any) -> None:
+    """Refuse an argument that is no finite number, or negative."""
+    if not isinstance(value, Real) or not math.isfinite(value) or value < 0:
+        raise InputError(source, argument, repr(value), "a finite number, 0 or more")
