@@ -6,6 +6,7 @@ import http.server
 import json
 import shutil
 import threading
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -355,6 +356,30 @@ def test_files_of_sockets_become_a_campaign_of_the_last_joint(recordings, tmp_pa
     assert document["distances"][0]["distance_m"] == 0.05
     with refused(recordings[0], "", "joint angles alone"):
         importer.read(recordings[0])
+
+
+def test_the_declared_noise_of_sockets_is_that_of_their_importer(recordings, tmp_path):
+    importer = replace(IMPORTERS["mukca_panda"], noise={"position_m": 3e-5})
+    folder = tmp_path / "mine"
+    importer.write_campaign(recordings, folder, ROBOTS, "mine")
+    document = yaml.safe_load((folder / "campaign.yaml").read_text())
+    assert document["noise"] == {"position_m": 3e-5}
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("same_pose_rad", 0.01),
+        ("parts", []),
+        ("table", {"kind": "table", "angles": ["q1"], "positions": {"A": ["x"]}}),
+    ],
+)
+def test_keys_of_tables_are_refused_beside_sockets(tmp_path, key, value):
+    entry = {"robots": ["panda"], "sockets": {"distance_m": 0.05}, key: value}
+    path = tmp_path / "public_data.yaml"
+    path.write_text(yaml.safe_dump({"mine": entry}))
+    with refused(path, f"mine.{key}", "a key beside sockets"):
+        read_importers(path)
 
 
 def test_folds_hold_out_poses_of_recordings_in_sockets_too(recordings, tmp_path):

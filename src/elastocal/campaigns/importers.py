@@ -398,6 +398,8 @@ class SocketImporter(Importer):
         table = tabulate_recordings(recordings)
         joints = recordings[0].angles.shape[1]
         document = describe_sockets(name, self.robots[0], recordings, self.distance_m)
+        if self.noise is not None:
+            document["noise"] = dict(self.noise)
         return _ImportedCampaign(document, table, joints)
 
 
@@ -455,6 +457,7 @@ def read_importers(path: Path) -> dict[str, Importer]:
             key: entry[key] for key in ("noise", "same_pose_rad") if key in entry
         }
         if "sockets" in entry:
+            _refuse_keys_of_tables(name, entry, path)
             importers[name] = SocketImporter(
                 files, _refuse_table, tuple(robots), **options, **entry["sockets"]
             )
@@ -462,6 +465,14 @@ def read_importers(path: Path) -> dict[str, Importer]:
         read = _find_reader(name, entry, parts, path)
         importers[name] = Importer(files, read, tuple(robots), **options, parts=parts)
     return importers
+
+
+def _refuse_keys_of_tables(name: str, entry: Mapping[str, Any], path: Path) -> None:
+    """Refuse keys that have no meaning where only joint angles were recorded."""
+    for key in ("same_pose_rad", "table", "parts"):
+        if key in entry:
+            allowed = "source, files, robots and noise, because each row is a pose"
+            raise InputError(path, f"{name}.{key}", "a key beside sockets", allowed)
 
 
 def _refuse_table(path: str | Path) -> PublicMeasurements:
