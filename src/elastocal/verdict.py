@@ -287,6 +287,25 @@ class JointRange:
 
 
 @dataclass(frozen=True)
+class BoardErrors:
+    """RMS errors of a board in the camera, before the calibration and of the final
+    model: what the camera reads less what the model predicts.
+
+    Attributes
+    ----------
+    before_m, after_m : float
+        Of the position.
+    before_rad, after_rad : float
+        Of the rotation.
+    """
+
+    before_m: float
+    after_m: float
+    before_rad: float
+    after_rad: float
+
+
+@dataclass(frozen=True)
 class HeldOut:
     """Errors of the validation poses.
 
@@ -315,6 +334,8 @@ class HeldOut:
         Errors with all rows; None if there is no gross error.
     delivered : ErrorSummary
         Errors of the robot as it is corrected, the regression included.
+    in_camera : BoardErrors or None
+        Errors of the board in the camera; None if no camera measures.
     """
 
     before: ErrorsBefore
@@ -330,6 +351,7 @@ class HeldOut:
     outside_range: ErrorsByRange
     with_gross_errors: BeforeAfter | None
     delivered: ErrorSummary
+    in_camera: BoardErrors | None = field(default=None, metadata=OMITTED_BY_DEFAULT)
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from elastocal.report.loop_facts import (
     tabulate_compliances,
 )
 from elastocal.report.loop_facts import tabulate_steps as table_rows
-from elastocal.verdict import Compliances
+from elastocal.verdict import Accuracy, BoardErrors, Compliances
 
 WORDS = {
     "adequate": "none of 30 candidate causes is needed",
@@ -228,3 +228,16 @@ def test_an_unidentifiable_compliance_has_no_number_unless_none_is_fitted():
     assert tabulate_compliances(Compliances((0.5,), (0.5,), (0.0,), (False,))) == [
         ["1", "0.5", "0.5"]
     ]
+
+
+def test_errors_of_a_board_are_stated_in_the_camera_and_for_the_robot():
+    accuracy = Accuracy("robot", 4e-4, 9e-4, None, None, 20, "the campaign's poses")
+    verdict = replace(CAMPAIGNS["named"], accuracy=accuracy)
+    in_camera = BoardErrors(4e-3, 2.5e-4, 3e-3, 8e-4)
+    board = replace(verdict, heldout=replace(verdict.heldout, in_camera=in_camera))
+    rows = render_campaign_sentences(board)["accuracy"]
+    assert rows[1][0].startswith("measured, the board in the camera")
+    assert "before: 4.00 mm, 3 mrad" in rows[1][0]
+    assert rows[1][1] == "0.250, 0.8 mrad"
+    assert rows[2][0].startswith("predicted, robot alone")
+    assert len(render_campaign_sentences(verdict)["accuracy"]) == 2

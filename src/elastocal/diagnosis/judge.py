@@ -43,6 +43,7 @@ from elastocal.validation.held_out import (
     PositionErrors,
     bound_share_below_maximum,
     compute_error_intervals,
+    compute_errors_as_read,
     compute_noise_floor,
     compute_position_errors,
     summarize_errors,
@@ -56,6 +57,7 @@ from elastocal.validation.transfer import (
 )
 from elastocal.verdict import (
     BeforeAfter,
+    BoardErrors,
     ErrorsBefore,
     ErrorsByRange,
     ErrorSummary,
@@ -378,6 +380,7 @@ def compare_held_out_errors(
         outside_range=from_document(ErrorsByRange, by_range, "errors by range"),
         with_gross_errors=None,
         delivered=after,
+        in_camera=_summarize_in_camera(transferred, held_out),
     )
     return (
         rows,
@@ -388,6 +391,23 @@ def compare_held_out_errors(
             *warn_of_repeated_poses(cases[0].observations.states, states),
         ],
     )
+
+
+def _summarize_in_camera(
+    transferred: Sequence[TransferredFit], held_out: Case
+) -> BoardErrors | None:
+    """Summarize errors of a board in the camera, of the first and the last model; None
+    if what was measured is the target itself."""
+    plan = held_out.campaign.measuring
+    if plan.channels or not plan.kinds[0].is_converted:
+        return None
+    rms = []
+    for model, estimate in (transferred[0], transferred[-1]):
+        errors = compute_errors_as_read(model, estimate, held_out.observations, plan)
+        squares = (errors**2).reshape(-1, 2, 3).sum(axis=2)
+        rms.append(np.sqrt(squares.mean(axis=0)).tolist())
+    (before_m, before_rad), (after_m, after_rad) = rms
+    return BoardErrors(before_m, after_m, before_rad, after_rad)
 
 
 def _tabulate_step(

@@ -21,9 +21,15 @@ from elastocal.fitting.least_squares import (
     register_placement,
 )
 from elastocal.fitting.linearization import linearize_coordinates
-from elastocal.fitting.model import compute_residuals, evaluate_conditions
+from elastocal.fitting.model import (
+    compute_residuals,
+    evaluate_conditions,
+    place_in_session,
+    predict,
+)
 from elastocal.fitting.observations import select_states, split_into_blocks
 from elastocal.fitting.sensor_noise import compute_sensor_roots
+from elastocal.mechanics.kinematics import compute_pose_differences
 from elastocal.validation.transfer import place_unseen_sessions
 
 if TYPE_CHECKING:
@@ -34,6 +40,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
+    from elastocal.measuring.channels import MeasuringPlan
 
 METRICS = ("mean_m", "rms_m", "p95_m", "max_m")
 _CONFIDENCE = 0.95
@@ -94,6 +101,31 @@ def compute_position_residuals(
         conditions = evaluate_conditions(model, estimate, block.states)
         residuals.append(compute_residuals(model, estimate, block, conditions)[:, :3])
     return np.concatenate(residuals)
+
+
+def compute_errors_as_read(
+    model: Model, estimate: Estimate, observations: Observations, plan: MeasuringPlan
+) -> np.ndarray:
+    """Compute what a kind such as `board` reads less what a model predicts that it reads.
+
+    Its measurements are fitted as poses of the target, whose errors differ: a rotation of
+    a board moves a camera that sees it by the range.
+
+    Returns
+    -------
+    (M, 6) array, m and rad, in the axes of the instrument
+    """
+    assert observations.rotation is not None
+    kind = plan.kinds[0]
+    options = {"camera": plan.camera}
+    conditions = evaluate_conditions(model, estimate, observations.states)
+    predicted = place_in_session(
+        estimate, observations, *predict(model, estimate, observations, conditions)
+    )
+    return compute_pose_differences(
+        *kind.convert(observations.position, observations.rotation, options),
+        *kind.convert(predicted.position, predicted.rotation, options),
+    )
 
 
 def summarize_errors(distance: np.ndarray) -> dict[str, float]:
