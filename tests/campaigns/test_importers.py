@@ -177,7 +177,7 @@ def test_a_session_of_the_fanuc_is_a_campaign(
         (target.name, target.point, target.offset_m) for target in campaign.targets
     ]
     assert targets == [(letter, "6DoF", None) for letter in letters]
-    assert campaign.measured == "position"
+    assert not campaign.measures_poses
     assert campaign.frame == "tracker"
     assert campaign.noise == IMPORTERS[name].noise
     assert campaign.compliance == "nominal"
@@ -274,7 +274,7 @@ def test_series_of_the_ur10_become_campaigns_of_poses_with_time_and_temperature(
     path, angles, position, degrees = write_series(tmp_path)
     campaign = import_campaign(tmp_path, "ur10_ipa", path)
     measurements = campaign.measurements
-    assert campaign.measured == "pose"
+    assert campaign.measures_poses
     assert campaign.noise == {"position_m": 2.1e-5, "orientation_rad": 3.0e-5}
     np.testing.assert_allclose(measurements.joint_angles, angles, rtol=0, atol=1e-15)
     np.testing.assert_allclose(

@@ -25,7 +25,7 @@ def test_a_campaign_is_read_as_written(cell):
     campaign = cell.read(effects=["joint_offset"])
     assert campaign.name == "cell7"
     assert campaign.robot.name == "three joints"
-    assert campaign.measured == "pose"
+    assert campaign.measures_poses
     assert campaign.frame == "base"
     assert campaign.targets == (
         Target("A", "elbow", (0.0, 0.0, 0.1), offset_std_m=2e-4),

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fitted_models import build_model
-from made_campaigns import POINTS, Plan, make_campaign
+from made_campaigns import POINTS, Plan, make_campaign, make_plan
 from scipy.optimize import root
 from support import OTHER_CHAINS, chain_of
 from synthetic import (
@@ -57,7 +57,7 @@ def describe_case(campaign, config_folder, **changes):
     document = {
         "campaign": "cell7",
         "robot": "kuka",
-        "measured": campaign.measured,
+        "measured": "pose" if campaign.measures_poses else "position",
         "frame": campaign.frame,
         "targets": {
             f"T{name}": {"point": name, "offset_m": "unknown"} for name in POINTS
@@ -177,7 +177,16 @@ def test_the_declared_model_follows_the_campaign(
         measurements, time_s=np.array([7.0, 5.0]), row=np.array([4, 9])
     )
     campaign = Campaign(
-        "c", fanuc, measured, frame, TWO_TARGETS, compliance, (), None, {}, measurements
+        "c",
+        fanuc,
+        make_plan(measured),
+        frame,
+        TWO_TARGETS,
+        compliance,
+        (),
+        None,
+        {},
+        measurements,
     )
     offset = candidates_on(make_model(fanuc.chain).sites)["joint_offset@2"]
     model = build_declared_model(campaign, (offset,))
@@ -448,7 +457,7 @@ def test_loads_on_springs_act_at_a_point_that_is_known_as_well_as_declared(
     campaign = Campaign(
         "c",
         rigid,
-        "position",
+        make_plan("position"),
         "base",
         TWO_TARGETS,
         compliance,

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_campaigns import Plan, make_campaign
+from made_campaigns import Plan, make_campaign, make_plan
 from planted import planted
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
@@ -56,7 +56,7 @@ def declare_campaign(robot, **noise):
     return Campaign(
         "c",
         robot,
-        "position",
+        make_plan("position"),
         "base",
         TARGETS,
         "nominal",

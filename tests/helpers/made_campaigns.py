@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from synthetic import fill_measurements
 
 from elastocal.campaigns.campaign import Campaign, Target
+from elastocal.measuring.channels import parse_measuring
 from elastocal.mechanics.elastostatics import compute_generalized_forces
 from elastocal.mechanics.kinematics import compute_poses, compute_poses_and_jacobians
 from elastocal.mechanics.robot import Robot
@@ -176,7 +177,7 @@ def make_campaign(
     return Campaign(
         name="made",
         robot=robot,
-        measured="pose" if plan.oriented else "position",
+        measuring=make_plan("pose" if plan.oriented else "position"),
         frame="tracker" if plan.tracker else "base",
         targets=tuple(Target(f"T{name}", name, offset_m) for name in POINTS),
         compliance="identify",
@@ -185,6 +186,11 @@ def make_campaign(
         holdout={"fraction": 0.3, "seed": 1},
         measurements=simulate_measurements(robot, simulated, plan, moving or {}, seed),
     )
+
+
+def make_plan(measured):
+    """Make the measuring plan of a kind without features."""
+    return parse_measuring({"measured": measured}, "campaign.yaml")
 
 
 def add_geometric_errors(robot, seed, size_m):

@@ -12,7 +12,6 @@ import numpy as np
 
 from elastocal.errors import InputError, suggest_names
 from elastocal.measuring.channels import MeasuringPlan, parse_measuring
-from elastocal.measuring.position import POSITION
 from elastocal.mechanics.chain import Chain
 from elastocal.mechanics.components import COMPONENT_NAMES, WRENCH_NAMES
 from elastocal.mechanics.robot import Robot
@@ -29,8 +28,6 @@ NO_REMAINDER = "none"
 BEST_REMAINDER = "auto"
 UNKNOWN = "unknown"
 NO_ROTATION = (0.0, 0.0, 0.0)
-# Measuring plan of a campaign of positions.
-POSITIONS = MeasuringPlan((POSITION,))
 # Standard deviation of each coordinate of a declared offset that states none, m: a
 # caliper on a bracket, or a drawing of the tool.
 OFFSET_STD_M = 2e-4
@@ -149,7 +146,7 @@ class Campaign:
     name : name of the campaign.
     robot : nominal robot; its joints are rigid if `compliance` is nominal and the robot
         file states none.
-    measured : "position", or "pose" if a measurement has six numbers.
+    measuring : kinds, features and channels of the measurements.
     frame : "base", or "tracker": the placement of the base is unknown, and different in
         each session.
     targets : tracked points of the robot.
@@ -165,12 +162,11 @@ class Campaign:
     remainder : residual model, a name in `residual_model.regressions`, "auto" or "none".
     table : name of the file of measurements; empty if there is none.
     header_line : line of the header if the file is text.
-    measuring : kinds, features and channels of the measurements.
     """
 
     name: str
     robot: Robot
-    measured: str
+    measuring: MeasuringPlan
     frame: str
     targets: tuple[Target, ...]
     compliance: str
@@ -183,7 +179,11 @@ class Campaign:
     base_std_m: float = 0.0
     table: str = ""
     header_line: int | None = None
-    measuring: MeasuringPlan = POSITIONS
+
+    @property
+    def measures_poses(self) -> bool:
+        """Whether a measurement is a pose: a position and an orientation."""
+        return self.measuring.rows == 6
 
     def locate_row(self, row: int) -> str:
         """Return where a row of the measurements is, by its line if the file is text."""
@@ -214,7 +214,7 @@ def assemble_campaign(
     return Campaign(
         name=document["campaign"],
         robot=robot,
-        measured="pose" if plan.rows == 6 else "position",
+        measuring=plan,
         frame="base" if document["frame"] == "base" else "tracker",
         targets=parse_targets(document["targets"], robot.chain, source),
         compliance=compliance,
@@ -229,7 +229,6 @@ def assemble_campaign(
         base_std_m=float(document.get("base_std_m", 0.0)),
         table=document.get("table", ""),
         header_line=document.get("header_line"),
-        measuring=plan,
     )
 
 

@@ -342,7 +342,7 @@ def load_correctable(source: Path) -> Correctable:
         campaign.name,
         campaign.calibrated,
         campaign.verdict,
-        campaign.case.campaign.measured == "pose",
+        campaign.case.campaign.measures_poses,
         [*campaign.folder.files()],
     )
 

@@ -220,7 +220,7 @@ def _compare_misfits(
 def list_discrete_hypotheses(campaign: Campaign) -> list[Hypothesis]:
     """List all hypotheses without fitted values, the simplest first."""
     hypotheses = [*_list_senses(campaign.robot.commands), *_list_lengths(campaign)]
-    if campaign.measured == "pose":
+    if campaign.measures_poses:
         return [
             *hypotheses,
             *_list_rotations(),
@@ -254,7 +254,7 @@ def list_fitted_hypotheses(campaign: Campaign) -> list[Hypothesis]:
         )
     unknown: dict[str, dict[str, Any]] = {}
     has_rotation = any(target.rotation is not None for target in targets)
-    if campaign.measured == "pose" and has_rotation:
+    if campaign.measures_poses and has_rotation:
         unknown["targets are turned otherwise"] = {"rotation": None}
     if any(target.offset_m is not None for target in targets):
         unknown["targets sit elsewhere"] = {"offset_m": None, "rotation": None}
@@ -298,7 +298,7 @@ def _find_wrong_scale(campaign: Campaign) -> list[Fault]:
     is_anywhere = campaign.frame == "tracker" and all(
         target.offset_m is None for target in campaign.targets
     )
-    if campaign.measured != "pose" or not is_anywhere:
+    if not campaign.measures_poses or not is_anywhere:
         return []
     written = place_measurements(campaign).misfit
     if written[0] < _SCALED_M or written[1] > IMPLAUSIBLE_RAD:

@@ -254,13 +254,12 @@ def build_declared_model(
     row_span = None
     if len(measurements):
         row_span = (int(measurements.row.min()), int(measurements.row.max()))
-    rows = 6 if campaign.measured == "pose" else campaign.measuring.rows
     time_s = measurements.time_s
     return Model(
         sites,
         campaign.targets,
         campaign.frame == "tracker",
-        rows,
+        campaign.measuring.rows,
         campaign.robot.compliance,
         (*own_effects, *effects),
         0.0 if time_s is None else float(time_s.min()),

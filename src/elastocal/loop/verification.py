@@ -413,7 +413,7 @@ def join_measurements(
     Remarks on columns that were left out, and on compliances.
     """
     _, campaign = read_described_campaign(folder)
-    if campaign.measured == "pose" and measured.rotation_vector is None:
+    if campaign.measures_poses and measured.rotation_vector is None:
         allowed = "rx, ry, rz or another orientation: this campaign measures poses"
         raise InputError(folder.source, "measured", "no measured orientations", allowed)
     before = campaign.measurements
@@ -488,7 +488,7 @@ def _tabulate_session(
         columns[f"approach{joint}"] = np.zeros(count)
     columns |= dict(zip(WRENCH_NAMES, wrench.T, strict=True))
     columns |= dict(zip("xyz", measured.position.T, strict=True))
-    if campaign.measured == "pose" and measured.rotation_vector is not None:
+    if campaign.measures_poses and measured.rotation_vector is not None:
         vectors = measured.rotation_vector
         columns |= dict(zip(ROTATION, vectors.T, strict=True))
     return columns | measured.conditions
