@@ -347,7 +347,7 @@ def test_noise_is_read_back_from_its_document():
 
 def test_noise_is_read_back_from_a_verdict():
     noise = Noise("declared", 1e-5, 2e-5, np.array([1e-6, 0, 3e-6]), 77, 2e-6)
-    restored = get_noise(_state_noise(noise, noise))
+    restored = get_noise(_state_noise(noise, noise.pose_rad, 1.0))
     assert serialize_noise(restored) == serialize_noise(noise)
 
 
