@@ -26,7 +26,7 @@ def test_exact_unknowns_are_not_fitted_and_others_have_their_priors():
     fitted = list_fitted_features(plan)
     assert [entry.numbers for entry in fitted] == [[0], [0, 1, 2]]
     assert [entry.columns for entry in fitted] == [slice(0, 1), slice(1, 4)]
-    parameters = list_feature_parameters(plan)
+    parameters = list_feature_parameters(fitted)
     assert [owner for owner, _ in parameters] == ["feature B"] + ["feature C"] * 3
     assert [p.prior_std for _, p in parameters] == [1e-3, None, None, None]
 

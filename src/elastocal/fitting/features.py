@@ -47,6 +47,7 @@ class FittedFeature:
     ----------
     index : index of the feature in the plan
     feature, kind : the feature and its kind
+    described : all unknowns of the feature
     numbers : indices of its fitted unknowns; exact ones are not fitted
     columns : slice of these unknowns among the fitted unknowns of all features
     """
@@ -54,14 +55,14 @@ class FittedFeature:
     index: int
     feature: Feature
     kind: Kind
+    described: tuple[Unknown, ...]
     numbers: list[int]
     columns: slice
 
     @property
     def unknowns(self) -> list[Unknown]:
         """The fitted unknowns."""
-        described = self.kind.unknowns(self.feature)
-        return [described[number] for number in self.numbers]
+        return [self.described[number] for number in self.numbers]
 
 
 def list_fitted_features(plan: MeasuringPlan | None) -> list[FittedFeature]:
@@ -70,22 +71,26 @@ def list_fitted_features(plan: MeasuringPlan | None) -> list[FittedFeature]:
     start = 0
     for index, feature in enumerate(plan.features if plan else ()):
         kind = list_kinds()[feature.kind]
+        described = kind.unknowns(feature)
         numbers = [
             number
-            for number, unknown in enumerate(kind.unknowns(feature))
+            for number, unknown in enumerate(described)
             if unknown.prior_std != 0.0
         ]
         if numbers:
             columns = slice(start, start + len(numbers))
-            fitted.append(FittedFeature(index, feature, kind, numbers, columns))
+            entry = FittedFeature(index, feature, kind, described, numbers, columns)
+            fitted.append(entry)
             start += len(numbers)
     return fitted
 
 
-def list_feature_parameters(plan: MeasuringPlan | None) -> list[tuple[str, Parameter]]:
+def list_feature_parameters(
+    features: Sequence[FittedFeature],
+) -> list[tuple[str, Parameter]]:
     """List the fitted parameters of features with their owners, such as "feature A"."""
     parameters = []
-    for entry in list_fitted_features(plan):
+    for entry in features:
         owner = f"feature {entry.feature.name}"
         for unknown in entry.unknowns:
             parameter = Parameter(
@@ -99,34 +104,31 @@ def list_feature_parameters(plan: MeasuringPlan | None) -> list[tuple[str, Param
 
 
 def get_feature_deviations(
-    plan: MeasuringPlan | None, values: Sequence[np.ndarray]
+    features: Sequence[FittedFeature], values: Sequence[np.ndarray]
 ) -> list[np.ndarray]:
     """Deviations of fitted unknowns from their declared values, one array a feature."""
     return [
         entry.kind.deviate(entry.feature, values[entry.index])[entry.numbers]
-        for entry in list_fitted_features(plan)
+        for entry in features
     ]
 
 
 def state_features(
-    plan: MeasuringPlan | None, values: Sequence[np.ndarray]
+    features: Sequence[FittedFeature], values: Sequence[np.ndarray]
 ) -> list[np.ndarray]:
     """Absolute values of fitted unknowns, one array a feature."""
-    return [
-        entry.kind.state(values[entry.index])[entry.numbers]
-        for entry in list_fitted_features(plan)
-    ]
+    return [entry.kind.state(values[entry.index])[entry.numbers] for entry in features]
 
 
 def move_features(
-    plan: MeasuringPlan | None,
+    features: Sequence[FittedFeature],
     values: Sequence[np.ndarray],
     components: Iterator[np.ndarray],
 ) -> tuple[np.ndarray, ...]:
     """Move the values of features by the next components of a step."""
     moved = list(values)
-    for entry in list_fitted_features(plan):
-        step = np.zeros(len(entry.kind.unknowns(entry.feature)))
+    for entry in features:
+        step = np.zeros(len(entry.described))
         step[entry.numbers] = next(components)
         moved[entry.index] = entry.kind.move(values[entry.index], step)
     return tuple(moved)
@@ -134,6 +136,7 @@ def move_features(
 
 def evaluate_channels(
     plan: MeasuringPlan,
+    features: Sequence[FittedFeature],
     observations: Observations,
     poses: SessionPoses,
     values: Sequence[np.ndarray],
@@ -143,6 +146,7 @@ def evaluate_channels(
     Parameters
     ----------
     plan : MeasuringPlan
+    features : fitted features of the plan
     observations : Observations
     poses : predicted poses of their targets
     values : values of each feature
@@ -154,7 +158,7 @@ def evaluate_channels(
         fitted ones of all features.
     """
     assert observations.channel is not None
-    fitted = {entry.index: entry for entry in list_fitted_features(plan)}
+    fitted = {entry.index: entry for entry in features}
     unknown_count = sum(len(entry.numbers) for entry in fitted.values())
     numbers = gather_numbers(observations, plan)
     count = len(observations)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,6 +27,7 @@ from elastocal.effects.gravity import (
 )
 from elastocal.effects.protocol import Candidate, Parameter, moved_and_turned
 from elastocal.fitting.features import (
+    FittedFeature,
     SessionPoses,
     evaluate_channels,
     get_feature_deviations,
@@ -121,6 +122,11 @@ class Model:
     base_std_m: float = 0.0
     measuring: MeasuringPlan | None = None
     shaped_noise: ShapedNoise | None = None
+
+    @cached_property
+    def fitted_features(self) -> list[FittedFeature]:
+        """Features with fitted unknowns."""
+        return list_fitted_features(self.measuring)
 
     @property
     def has_orientations(self) -> bool:
@@ -318,7 +324,7 @@ def list_parameters(model: Model, estimate: Estimate) -> list[tuple[str, Paramet
                     prior_std=target.offset_std_m,
                 )
             parameters.append((owner, component))
-    parameters += list_feature_parameters(model.measuring)
+    parameters += list_feature_parameters(model.fitted_features)
     for effect in model.effects:
         parameters += [(effect.key, parameter) for parameter in effect.parameters]
         for shape in effect.shapes:
@@ -388,7 +394,7 @@ def get_parameter_values(model: Model, estimate: Estimate) -> np.ndarray:
         if target.has_inexact_offset:
             deviation[:3] = estimate.target_offset[index] - target.offset_m
         values.append(deviation[fitted])
-    values += get_feature_deviations(model.measuring, estimate.features)
+    values += get_feature_deviations(model.fitted_features, estimate.features)
     for coefficients, shapes in zip(
         estimate.coefficients, estimate.shapes, strict=True
     ):
@@ -439,7 +445,7 @@ def _move_placement(
         frame_position=frame_position,
         target_offset=target_offset,
         target_rotation=target_rotation,
-        features=move_features(model.measuring, estimate.features, components),
+        features=move_features(model.fitted_features, estimate.features, components),
     )
 
 
@@ -449,7 +455,7 @@ def _group_sizes(model: Model, estimate: Estimate) -> list[int]:
     sizes = [6] * len(estimate.sessions) if model.has_frame_parameters else []
     for _, fitted in model.fitted_target_components:
         sizes.append(fitted.stop - fitted.start)
-    sizes += [len(entry.numbers) for entry in list_fitted_features(model.measuring)]
+    sizes += [len(entry.numbers) for entry in model.fitted_features]
     for effect in model.effects:
         sizes += [len(effect.parameters), len(effect.shapes)]
     return sizes
@@ -670,7 +676,13 @@ def predict_channels(
     targets and in the features, from predicted poses (M, 3), (M, 3, 3); base axes."""
     assert model.measuring is not None
     poses = place_in_session(estimate, observations, position, rotation)
-    return evaluate_channels(model.measuring, observations, poses, estimate.features)
+    return evaluate_channels(
+        model.measuring,
+        model.fitted_features,
+        observations,
+        poses,
+        estimate.features,
+    )
 
 
 def place_in_session(

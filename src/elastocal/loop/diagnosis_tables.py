@@ -323,7 +323,7 @@ def _stack_values(model: Model, estimate: Estimate) -> np.ndarray:
         ).as_rotvec()
         placement = np.concatenate([estimate.target_offset[target], rotation_vector])
         values.append(placement[fitted])
-    values += state_features(model.measuring, estimate.features)
+    values += state_features(model.fitted_features, estimate.features)
     for pair in zip(estimate.coefficients, estimate.shapes, strict=True):
         values += pair
     return np.concatenate(values)
