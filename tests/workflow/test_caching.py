@@ -276,7 +276,7 @@ imports = [node for node in body if isinstance(node, (ast.Import, ast.ImportFrom
 exec(compile(ast.Module(imports, []), script, "exec"), {})
 exec(f"import {step}" if step else "")
 # A catalogue imports the modules of its package when it is first asked.
-catalogues = [name for name, module in sys.modules.items() if "list_modules" in vars(module)]
+catalogues = [name for name, module in sys.modules.items() if "list_entries" in vars(module)]
 for name in catalogues:
     if name != "elastocal.io.modules":
         package = sys.modules[name.rpartition(".")[0]]
