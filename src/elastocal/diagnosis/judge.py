@@ -27,7 +27,7 @@ from elastocal.fitting.model import (
     predict,
     transform_to_base,
 )
-from elastocal.fitting.noise import get_noise
+from elastocal.fitting.noise import count_effective_parameters, get_noise
 from elastocal.fitting.observations import index_poses, separate_measurements
 from elastocal.io.typed_json import from_document, to_document
 from elastocal.random_streams import open_stream
@@ -420,7 +420,7 @@ def _tabulate_step(
     row: dict[str, Any] = {
         "step": step.name,
         "kind": step.kind,
-        "parameters": int((~step.fitted.unidentifiable).sum()),
+        "parameters": round(count_effective_parameters(step.fitted)),
     }
     row |= {f"train_{name}": training[name] for name in METRICS}
     for name in METRICS:
