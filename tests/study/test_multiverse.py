@@ -1,4 +1,4 @@
-"""Each interpretation the other way changes what it is about, and nothing else."""
+"""The alternative to an interpretation changes its own figures, and no others."""
 
 import numpy as np
 import pandas as pd

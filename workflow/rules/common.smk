@@ -298,7 +298,7 @@ def study_in_memory(interpretations=INTERPRETATIONS, robot=robot_document, **siz
 
 
 ALTERNATIVES = config["evaluation"]["alternatives"]
-# Robots that an interpretation the other way changes.
+# Robots that the alternative to an interpretation changes.
 ALTERNATIVE_ROBOTS = {number: REDUCED for number in ALTERNATIVES["interpretations"]}
 ALTERNATIVE_ROBOTS |= {
     number: [robot for robot in REDUCED if robot in robots]
@@ -308,7 +308,7 @@ ALTERNATIVE_ROBOTS |= {
 
 
 def robot_of_alternative(wildcards):
-    """Return the document of a robot with the lengths of an interpretation the other way."""
+    """Return the document of a robot with the lengths of the alternative to an interpretation."""
     document = robot_document(wildcards)
     lengths_m = ALTERNATIVES["lengths_m"].get(wildcards.number, {}).get(wildcards.robot)
     # A chain may state its lengths itself.
@@ -318,7 +318,7 @@ def robot_of_alternative(wildcards):
 
 
 def alternative_study(wildcards):
-    """Return the study of a robot under an interpretation the other way."""
+    """Return the study of a robot under the alternative to an interpretation."""
     changes = ALTERNATIVES["interpretations"].get(wildcards.number, {})
     return study_in_memory(INTERPRETATIONS | changes, robot_of_alternative)(wildcards)
 

@@ -131,7 +131,7 @@ rule draw_multiverse:
             "reports/figures/multiverse.png",
             "multiverse_figure",
             PAPER,
-            "Interpretations the other way",
+            "Interpretations and their alternatives",
         ),
     params:
         figure="draw_multiverse",

@@ -1,6 +1,6 @@
 """Repeated studies: how much studies of the same size differ, Table 4 over all of them, and studies under other interpretations.
 
-Needs only the configuration. Writes results/studies/{robot}.parquet, of each interpretation the other way
+Needs only the configuration. Writes results/studies/{robot}.parquet, of the alternative to each interpretation
 results/alternatives/{number}/studies/{robot}.parquet and initial/{robot}.parquet, and reports/tables/strategies_over_studies.csv.
 """
 

@@ -155,7 +155,7 @@ rule tabulate_multiverse:
             "reports/tables/multiverse.csv",
             "multiverse",
             PAPER,
-            "Every printed figure with each interpretation the other way",
+            "Every printed figure with the alternative to each interpretation",
         ),
         summary="reports/tables/multiverse_summary.csv",
     params:

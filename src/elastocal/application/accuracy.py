@@ -68,9 +68,9 @@ _MIN_RELATIVE_VARIANCE = 1e-4
 _BISECTIONS = 10
 # Poses for which the errors of all simulated robots are in memory at once.
 _CHUNK = 200
-# Chunks of poses whose repeatability is drawn anew. Further chunks take the random numbers
-# of the last of them again, each time for other robots: random numbers would take most of
-# the time of a long path, and a robot never meets one of them twice.
+# Number of chunks of poses with new random numbers for the repeatability. Further chunks
+# reuse those of the last one for other robots, because drawing takes most of the time of
+# a long path. No robot gets the same number twice.
 _DRAWN_CHUNKS = 5
 # Upper bound on the states over which the accuracy of a campaign is stated; more states
 # do not change a printed digit.
@@ -327,7 +327,7 @@ class _RandomRobots:
     joint_std_rad: np.ndarray
 
     def generate_repeats(self, poses: int) -> Iterator[tuple[slice, _RepeatingRobots]]:
-        """Generate chunks of so many poses with the random errors of the joints there."""
+        """Generate chunks of a number of poses with the random errors of the joints."""
         draws = len(self.repeatability_scale)
         normals = np.zeros(0)
         for number, chunk in enumerate(split_into_chunks(poses, _CHUNK)):
@@ -342,7 +342,7 @@ class _RandomRobots:
 
 @dataclass(frozen=True)
 class _RepeatingRobots:
-    """Random robots, and what the repeatability of their joints is at a chunk of K poses.
+    """Random robots with the repeatability errors of their joints at a chunk of K poses.
 
     Attributes
     ----------
@@ -437,7 +437,7 @@ def _predict_chunk(
     regression: _RegressionErrors,
     repeating: _RepeatingRobots,
 ) -> _ChunkErrors:
-    """Predict the errors at a chunk of poses, and simulate those of random robots."""
+    """Predict the errors at a chunk of poses, and simulate the errors of random robots."""
     pose = predict_poses(calibrated, reported_angles, wrench)
     placed = _compute_placed_sensitivities(calibrated, reported_angles, wrench, pose)
     robots = repeating.robots

@@ -1,15 +1,16 @@
 """All postures of an arm with six revolute joints for wanted poses, in closed form.
 
-Two kinds of arms have one here, and both have two parallel axes 2 and 3. Either the last
-three axes intersect in the wrist centre, which the first three joints alone place; the
-wrist then turns what it holds [1]. Or axis 4 is parallel to axes 2 and 3 as well, and
-axes 5 and 6 intersect, as those of most collaborative arms: the three parallel axes move
-the intersection in one plane, which determines joint 1 first [2]. Axes are those of the
-robot at zero angles, in base axes (product of exponentials), and the equations are Paden
-and Kahan's subproblems [3].
+Two kinds of arms have a closed form here; in both, axes 2 and 3 are parallel. In the
+first kind, the last three axes intersect in the wrist centre, whose position depends on
+the first three joints alone; the other three joints rotate the tool about it [1]. In the
+second kind, as in most collaborative arms, axis 4 is parallel to axes 2 and 3 too, and
+axes 5 and 6 intersect. The three parallel axes move this intersection in one plane, which
+determines joint 1 first [2]. Axes are given in base axes for the robot at zero angles
+(product of exponentials), and the equations are Paden and Kahan's subproblems [3].
 
-An arm whose axes are only nearly so, such as one with calibrated axes, is solved as the
-nearest arm that has a closed form; Newton's method has to start from its solutions.
+If the axes satisfy these conditions only approximately, for example after a calibration,
+the nearest arm with a closed form is solved; Newton's method has to start from its
+solutions.
 
 References
 ----------
@@ -37,7 +38,8 @@ if TYPE_CHECKING:
 # Largest distance (m) of axes from their intersection, and largest sine of the angle
 # between parallel axes: these are zero but for rounding in an exact arm.
 _ROUNDING = 1e-9
-# The same of an arm that is nearly one of these: several times what calibrations find.
+# The same for an arm that is approximately of one of these kinds: several times the
+# deviations that calibrations find.
 _NEARLY = 0.02
 # Least sine of the angle between axes that must not be parallel.
 _CROSSED = 0.5
@@ -232,7 +234,7 @@ class SphericalWristArm(ClosedFormArm):
         in front, that complete rotations (N, 3, 3) from zero angles; also returns
         whether they do."""
         axis_4, axis_5, axis_6 = self.axes[3:]
-        # Where the wrist alone has to turn axis 6 and, beside it, axis 5.
+        # Directions to which the wrist alone has to rotate axes 6 and 5.
         wanted_6 = turn @ axis_6
         wanted_5 = turn @ axis_5
         for axis, angle in zip(self.axes, first_angles, strict=False):

@@ -1,11 +1,11 @@
-"""Corrected joint targets: what to command so that the loaded, sagging, imperfect robot
-comes to rest at the wanted poses.
+"""Corrected joint targets: commands for which the loaded, sagging, imperfect robot comes
+to rest at the wanted poses.
 
 They are found by Newton's method on the forward model of the calibrated robot, with the
 Jacobian of the rigid chain (a simplified Newton method [1]). The error of this Jacobian
 is the robot's deviation over its reach, some 1 / 500, and each step reduces the pose
-error by this factor. The errors of uncorrected targets, which the rigid robot of the
-file would be commanded, are predicted for comparison [2].
+error by this factor. For comparison, the errors of uncorrected targets are predicted,
+which are those of the rigid robot of the file [2].
 
 [1] Deuflhard, P., Newton Methods for Nonlinear Problems, section 2.1.2, Springer, 2011.
 [2] Mooring, B. W., Roth, Z. S. and Driels, M. R., Fundamentals of Manipulator

@@ -4,10 +4,9 @@ not counted as errors in it.
 In the frame `BASE` the base is declared, because the measurements were taken in it. In
 the frame `ROBOT` errors are counted after the best rigid placement of the base over the
 campaign's poses [1]. In both frames a constant offset at the end effector is not an
-error if the offset of the target there was fitted. Calibration data and use of the
-robot have these degrees of freedom in common: the use does not need what the data
-cannot determine. The placement is fitted to the campaign's poses as a whole, so that a
-single new pose has an error, too.
+error if the offset of the target there was fitted. The data do not determine these
+degrees of freedom, and the use of the robot does not need them. The placement is fitted
+to the campaign's poses as a whole, so that a single new pose has an error, too.
 
 [1] Kabsch, W., A solution for the best rotation to relate two sets of vectors, Acta
 Crystallographica A32, 1976.
@@ -40,7 +39,7 @@ _CHUNK = 500
 
 @dataclass(frozen=True)
 class Scope:
-    """Meaning of the errors of a robot: their frame and what else they contain.
+    """Meaning of the errors of a robot: their frame and their contributions.
 
     Attributes
     ----------

@@ -57,14 +57,14 @@ _SMALLEST_DAMPING = 1e-14
 _LARGEST_DAMPING = 1e6
 # Starts for each row: an arm of six joints usually has eight postures.
 _STARTS = 12
-# Every so many rows of a path, and the last one, are solved from all starts. Between
-# them the solutions of the nearest such row are close enough for Newton's method, which
-# then needs a few iterations instead of some twenty.
+# Distance, in rows of a path, between rows that are solved from all starts. Between them
+# the solutions of the nearest such row are close enough for Newton's method, which then
+# needs a few iterations instead of some twenty.
 _ANCHOR_SPACING = 16
 # A joint may turn from target to target by this multiple of the rotation of the path,
-# and by a constant (rad): wrists turn a few times as far as what they hold unless they
-# are near a singular posture, and targets that differ in position alone need some
-# rotation, too. A change of posture or of turns is far larger than both.
+# and by a constant (rad). Unless a wrist is near a singular posture, its joints rotate at
+# most a few times as far as the tool, and targets that differ in position alone need some
+# rotation too. A change of posture or of whole turns is far larger than both.
 STEP_PER_TURN = 5.0
 STEP_ALLOWANCE = np.radians(10.0)
 # Copies of a solution that differ by whole turns are candidates too, within two turns
@@ -426,7 +426,7 @@ def _find_periods(robot: Robot) -> np.ndarray:
 def _copy_postures(
     robot: Robot, postures: np.ndarray, limits: np.ndarray
 ) -> list[np.ndarray]:
-    """Copy postures (K, N, n) whole turns above, as many as fit into the limits.
+    """Copy postures (K, N, n) shifted by all whole turns upwards within the limits.
 
     Returns angles (K, N, turns) of each joint.
     """

@@ -14,8 +14,9 @@ import numpy as np
 
 # Rounding errors of joint angles at their limits (rad, or m).
 JOINT_ROUNDING = 1e-9
-# Weights of the path's cost beside its length: the excess of steps that are too large
-# comes first, the distance from the middle of the limits last.
+# Weights of further costs of a path relative to its length: the excess of steps that are
+# too large outweighs the length, the distance from the middle of the limits only decides
+# between equal paths.
 _EXCESS_WEIGHT = 1e4
 _MIDDLE_WEIGHT = 1e-5
 # Rows of a path whose costs are in memory at once.
@@ -24,13 +25,13 @@ _BLOCK = 512
 
 @dataclass(frozen=True)
 class PathCandidates:
-    """Up to K postures of each of N rows, each with copies whole turns away, and what a
-    path through them costs.
+    """Up to K postures of each of N rows, each with copies shifted by whole turns, and
+    the cost of a path through them.
 
     Attributes
     ----------
     copies : for each joint, its angles (K, N, turns): the lowest one within the limits,
-        and those whole turns above.
+        and its copies shifted upwards by whole turns.
     limits : (n, 2), rad or m; copies above them are excluded.
     exclusion : (K, N) infinite if a row has fewer postures, else 0.
     allowed : (N - 1, n) largest steps without an additional cost, rad or m.
@@ -261,9 +262,9 @@ def _accumulate_costs(candidates: PathCandidates) -> list[np.ndarray]:
     totals = [candidates.posture_costs(slice(0, 1))[0]]
     for rows in candidates.split_rows():
         posture_costs = candidates.posture_costs(rows)
-        # Axes: rows, K of the row before, K, turns of all joints. The first of the turns
-        # belongs to the row before; minimising over it appends that of this row, so
-        # after all joints the turns are those of this row.
+        # Axes: rows, K of the row before, K, turns of all joints. The first axis of turns
+        # belongs to the row before. Minimising over it appends the axis of this row, so
+        # after all joints the axes of turns belong to this row.
         motion_costs = [
             np.expand_dims(costs, tuple(range(4, joints + 3)))
             for costs in candidates.motion_costs(rows)

@@ -1,4 +1,4 @@
-"""What the effects of a fit that no command contains do at poses that are asked.
+"""Errors at given poses by effects of a fit that no command can correct.
 
 A command states neither the side from which a joint is approached nor the time. So each
 pose has several possible errors: those of all sides, and of all times at which the
@@ -172,8 +172,8 @@ class LeftOutEffects:
 
 
 def is_left_out(effect: Candidate) -> bool:
-    """Whether tasks may feel an effect that no command contains; an error of what a
-    campaign declares of its own measurements ends with them."""
+    """Whether an effect that no command corrects also acts in the use of the robot. An
+    error of declared values of the campaign's own set-up does not."""
     return not is_commanded(effect) and effect.family != "declared"
 
 

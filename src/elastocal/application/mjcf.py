@@ -4,7 +4,8 @@ Each joint has a position servo whose gain is the stiffness of its gear, so that
 to rest at its command plus its compliance times its load. Bases, bearings and flanges
 that yield are passive joints with a stiffness. Constant errors of the geometry are part of
 the bodies' poses, and weights are bodies. Other effects, such as gear waves, plays and
-links that bend, have no counterpart among rigid bodies; they are left out and named.
+links that bend, have no counterpart among rigid bodies. They are left out, and their
+names are returned.
 
 MuJoCo composes the joints of a body in their order, as the chain does. Its hinges and
 slides are about and along axes of the body, and its servos act as linear springs (MuJoCo
@@ -163,7 +164,7 @@ class _Arm:
             self._add_spring(transform, compliance)
 
     def add_bodies(self, after: int) -> None:
-        """Add the weights in the frame behind so many transforms."""
+        """Add the weights in the frame behind the first `after` transforms."""
         for body in self._model.kinematics.bodies:
             if body.after == after and body.loads_joints and body.mass_kg:
                 centre = np.array(body.moment_kg_m) / body.mass_kg

@@ -134,7 +134,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Kinematics:
-    """The chain with all coordinates, and what loads it.
+    """The chain with all coordinates, and the bodies that load it.
 
     Attributes
     ----------
@@ -814,7 +814,7 @@ def _as_rows(values: np.ndarray) -> Rows:
 
 
 def _as_json(column: np.ndarray) -> list[Any]:
-    """Return a column as lists, with None in place of what is unknown."""
+    """Return a column as lists, with None instead of NaN."""
     if column.dtype.kind != "f" or not np.isnan(column).any():
         listed: list[Any] = column.tolist()
         return listed

@@ -103,7 +103,7 @@ def _leave_features(fit: CampaignFit) -> CampaignFit:
     knows_base = plan is None or plan.states_places
     has_unknown_base = not model.has_frame_parameters and not knows_base
     if has_unknown_base:
-        # Features anywhere say nothing of the base: its axes are a convention.
+        # Features in unknown places do not locate the base; its axes are a convention.
         frames = 6 * len(estimate.sessions)
         covariance = np.pad(covariance, ((frames, 0), (frames, 0)))
     return CampaignFit(
@@ -211,7 +211,7 @@ def determine_scope(
     covariance: np.ndarray,
     states: States,
 ) -> Scope:
-    """Determine what the errors of a robot mean, from the fit behind it.
+    """Determine the meaning of the errors of a robot from its fit.
 
     Errors are stated in the base frame if the campaign declares it, else after the best
     placement of the base.

@@ -51,13 +51,13 @@ if TYPE_CHECKING:
     from elastocal.application.accuracy import ErrorPrediction
     from elastocal.application.calibrated import CalibratedRobot
 
-# Level of both tests: this share of correct predictions is called wrong by chance, and
-# of exact corrections is called incomplete.
+# Level of both tests: the share of correct predictions that are rejected, and of exact
+# corrections that are called incomplete, by chance.
 LEVEL = 0.05
-# Probability with which the error is noticed that is stated as the power of the test.
+# Power of the test for the additional error that is stated.
 POWER = 0.8
-# If a placement is fitted to the targets, it takes up to nine of their coordinates. Of
-# twelve targets, at least three times as many are not fitted.
+# A placement that is fitted to the targets uses up to nine degrees of freedom. With twelve
+# targets, the residual has at least three times as many.
 FEWEST_PLACED_TARGETS = 12
 _DRAWS = 4000
 # Share of draws that must be possible. A correctly stated noise leaves fewer in one

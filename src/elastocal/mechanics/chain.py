@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 AXES = "xyz"
 # Candidates grow with the square of the joints: with 40 joints `elastocal check` took
-# 1.9 GB. No arm that is calibrated has as many.
+# 1.9 GB. No arm has as many joints.
 MOST_JOINTS = 32
 # Kind and axis of the six elementary displacements of a frame: Tx Ty Tz Rx Ry Rz.
 SIX_DISPLACEMENTS = tuple((kind, axis) for kind in "TR" for axis in range(3))

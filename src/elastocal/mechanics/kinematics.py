@@ -363,7 +363,7 @@ def compute_motion(
         chain, coordinates, len(chain.transforms), BLOCK // 2
     ):
         _store_poses(frames, points, position[..., block], rotation[..., block])
-        # The fewer the configurations, the more coordinates at once.
+        # With fewer configurations, process more coordinates in one step.
         step = max(_TWISTS // max(len(coordinates[block]), 1), 1)
         for start in range(0, len(indices), step):
             _store_spatial_twists(

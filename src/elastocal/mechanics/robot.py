@@ -177,8 +177,8 @@ class Robot:
 
     @property
     def is_coupled(self) -> np.ndarray:
-        """Whether a joint follows others or is followed, (n,) bool array. Such a joint
-        has no copies whole turns away, because the others would move with it."""
+        """Whether a joint follows others or is followed, (n,) bool array. A whole turn of
+        such a joint is not an equivalent posture, because other joints move with it."""
         if not self.has_followers:
             return np.zeros(self.joints, bool)
         moves = self.reported_matrix != 0.0

@@ -119,7 +119,7 @@ def describe_robot(robot: Robot) -> dict[str, Any]:
     """Describe a robot without elastic links as the contents of its file, the inverse
     of `parse_robot`.
 
-    Optional keys are left out if they have their default; lengths stand in the chain as
+    Optional keys with their default values are left out; the chain contains lengths as
     numbers.
     """
     units = _units(robot.chain)
@@ -321,7 +321,7 @@ def _parse_links(
         allowed = f"one for all links or one for each of the {len(sections)}"
         count = format_count(len(tubes), "tube")
         raise InputError(source, "links.tubes", count, allowed)
-    # One tube stands for all links.
+    # A single tube is used for all links.
     tubes *= len(sections) // len(tubes)
     return tuple(
         Link(after, vector_m, tube)

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from elastocal.verdict import Verdict
 
 _CAMPAIGN = re.compile(r"reports/loop/([^/]+)/report\.pdf")
-# Verdicts after which the robot is corrected; after the others its report advises what
-# to do.
+# Verdicts after which the robot is corrected; after other verdicts the report says what to
+# do.
 _CORRECTABLE = ("adequate", "named", "class", "several")
 _REPORTS = {
     "reports/paper.pdf": "the paper, regenerated",

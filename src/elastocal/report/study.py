@@ -208,7 +208,7 @@ def _count_estimators(scores: pd.DataFrame) -> int:
 
 
 def _summarize_detectable(judged: pd.DataFrame) -> pd.DataFrame:
-    """Smallest differences that a figure alone and the family could have seen, as shares
+    """Smallest differences that a figure alone and the family can detect, as shares
     of the studies' median: the median over the figures of each quantity."""
     median = judged.studies_median
     shares = pd.DataFrame(

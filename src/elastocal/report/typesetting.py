@@ -26,9 +26,9 @@ _LINE_OF_TAGS = re.compile(r"^[ \t]*((?:\{%(?:(?!%\}).)*%\})+)[ \t]*\n", re.MULT
 # A section of a template of sentences: marks, name and text.
 _SECTION = re.compile(r"^(##?) (\w+)\n(.*?)(?=^##? \w+\n|\Z)", re.DOTALL | re.MULTILINE)
 _EMPTY_LINES = r"\n[ \n]*\n"
-# What separates the cells of a row, and what stands for it where it belongs to a value,
-# such as a serial number, until the cells are separated. The latter is a private-use
-# character of Unicode, which means nothing by itself.
+# Separator of the cells of a row, and the character that replaces it in a value, such as a
+# serial number, until the cells are separated. The latter is a private-use character of
+# Unicode, which has no meaning of its own.
 _SEPARATOR = "¦"
 _SEPARATOR_IN_VALUE = "\ue0a6"
 

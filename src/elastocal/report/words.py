@@ -202,9 +202,9 @@ def _format_single_location(
 def format_hypotheses(sets: Sequence[MechanismSet]) -> list[str]:
     """Return hypotheses in words, the most probable one first.
 
-    A hypothesis that contains all mechanisms of the first one is described by what it
-    adds. `OTHER` alone is something that the catalogue does not have; together with a
-    mechanism it means that a related mechanism may act.
+    A hypothesis that contains all mechanisms of the first one is described by its
+    additional mechanisms. `OTHER` alone is something that the catalogue does not have;
+    together with a mechanism it means that a related mechanism may act.
     """
     first = set(sets[0].mechanisms) if sets else set()
     hypotheses = []
@@ -249,12 +249,12 @@ def format_mechanisms(
 
 
 def format_alternative(name: str) -> str:
-    """Return what may be meant instead of a mechanism: another, or a related one."""
+    """Return the words for an alternative: another mechanism, or a related one."""
     return RELATED if name == OTHER else name_effect(name)
 
 
 def find_common_kind(effect: str, alternatives: Iterable[str]) -> str:
-    """Return what an effect and its alternatives have in common, such as "yielding".
+    """Return the common kind of an effect and its alternatives, such as "yielding".
 
     The result is empty if they are of several kinds, or if one of them is not in the
     catalogue, because it may be of any kind.
@@ -304,7 +304,7 @@ def name_data_set(name: str) -> str:
 def join_items(
     items: Iterable[str], limit: int | None = None, last: str = "and"
 ) -> str:
-    """Return items as they stand in a sentence.
+    """Join items for a sentence: "a, b and c".
 
     Parameters
     ----------
@@ -395,7 +395,7 @@ def format_estimate(value: float, error: float) -> str:
 
 
 def format_number(value: float, digits: int = 3) -> str:
-    """Return a number with so many significant digits and without an exponent."""
+    """Return a number with a number of significant digits and without an exponent."""
     if value == 0:
         return "0"
     # Round first: a value that rounds up to the next power of ten has one decimal less.

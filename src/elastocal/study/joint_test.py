@@ -12,13 +12,12 @@ figure (means of 1/c have no finite variance) nor the dependence of the figures 
   [1] with these maxima corrects the distances for the number of figures.
 - The number of figures with a p value below the level is a second joint statistic.
 
-No p value is smaller than 1/(k + 1) [2]. A printed figure is rounded: the value within its
-rounding that is closest to the median of the studies stands for it, which favours the
-paper.
+No p value is smaller than 1/(k + 1) [2]. A printed figure is rounded. It is replaced by
+the value within its rounding that is closest to the median of the studies, which favours
+the paper.
 
-A figure can only be found to differ if it lies outside some interval. The interval of the
-whole family says what could not have been seen: values within it do not differ from the
-studies at the level of the family.
+Each figure has an interval within which it does not differ from the studies at the level
+of the whole family; differences within it cannot be detected.
 
 References
 ----------
@@ -295,7 +294,7 @@ def build_joint_row(printed: pd.DataFrame, values: np.ndarray) -> dict[str, Any]
         "studies": len(values),
     }
     if not covered.any():
-        # The paper prints nothing of these robots and strategies.
+        # The paper prints no figures of these robots and strategies.
         nothing = np.full(2, np.nan)
         ranks = _rank_first("largest_distance", nothing) | _rank_first("below", nothing)
         return row | {"differ": 0} | dict.fromkeys(ranks, np.nan)

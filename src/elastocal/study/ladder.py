@@ -46,8 +46,8 @@ if TYPE_CHECKING:
 
 CHOSEN = "by cross-validation"
 FOLDS = 5
-# Nonzero elements (row, column) of the compliance of a beam along x; those off the
-# diagonal stand for themselves and their mirror images.
+# Nonzero elements (row, column) of the symmetric compliance of a beam along x, on and
+# above the diagonal.
 _ELEMENTS = ((0, 0), (1, 1), (2, 2), (3, 3), (4, 4), (5, 5), (1, 5), (2, 4))
 # Ridge, as a share of a column's squares, that keeps the normal equations well posed if
 # two springs have the same effect, such as the torsion of the first link and the first

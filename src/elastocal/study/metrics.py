@@ -234,7 +234,7 @@ def extrapolate_length(values: np.ndarray, limit: float) -> np.ndarray:
 
 def extrapolate_first_length(values: np.ndarray, limit: float) -> np.ndarray:
     """As `extrapolate_length`, but the first length within the limit, even if longer data
-    sets leave it again (interpretation R14 the other way)."""
+    sets leave it again (the alternative to interpretation R14)."""
     within = np.abs(values) <= limit
     first = within.argmax(axis=-1) + 1.0
     return np.where(within.any(axis=-1), first, extrapolate_length(values, limit))

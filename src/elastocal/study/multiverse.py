@@ -1,8 +1,8 @@
-"""The multiverse of the paper's open points [1]: each interpretation the other way, and
-its effect on every printed figure.
+"""The multiverse of the paper's open points [1]: the alternative to each interpretation,
+and its effect on every printed figure.
 
-Other ways that change the simulation (R2 to R6) have studies of their own, with the
-random numbers of the first further studies, so that effects are paired. Other ways of
+Alternatives that change the simulation (R2 to R6) have studies of their own, with the
+random numbers of the first further studies, so that effects are paired. Alternatives of
 scoring (R7, R8, R10, R13, R14) use the same studies.
 
 References
@@ -54,7 +54,7 @@ _HEADS = ["table", "robot", "strategy", "quantity"]
 
 @dataclass(frozen=True)
 class Universe:
-    """One interpretation the other way.
+    """The alternative to one interpretation.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class Universe:
 
 
 def list_scorings(usual: Universe) -> list[Universe]:
-    """List the other ways of scoring the studies of our interpretations."""
+    """List the alternative scorings of the studies of our interpretations."""
     studies = usual.studies
     initial = usual.initial
     reading = usual.reading
@@ -108,8 +108,8 @@ def _pool(initial: pd.DataFrame) -> pd.DataFrame:
 def build_multiverse_table(
     printed: pd.DataFrame, usual: Universe, others: Sequence[Universe]
 ) -> pd.DataFrame:
-    """Compare every printed figure with its value by our interpretations, and by one of
-    them the other way.
+    """Compare every printed figure with its value by our interpretations, and by the
+    alternative to one of them.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def build_multiverse_table(
     -------
     DataFrame
         Number of the interpretation, heads of the figure; paper, ours and other (medians
-        over the studies that both have), and the share by which the other way changes
+        over the studies that both have), and the share by which the alternative changes
         ours, in percent, paired by study. Only figures that both have.
     """
     rows = []
@@ -163,14 +163,14 @@ def summarize_multiverse(
     table
         From `build_multiverse_table`.
     interpretations
-        With number, open, interpretation, other way and what it was chosen on.
+        With number, open, interpretation, alternative and the figures it was chosen on.
 
     Returns
     -------
     DataFrame
         Number of figures that change by over 5 %; the median factor between the paper
-        and ours, and between the paper and the other way, over the figures that change;
-        empty if there is no other way that can be computed.
+        and ours, and between the paper and the alternative, over the figures that change;
+        empty if no alternative can be computed.
     """
     rows = []
     for number in interpretations.number:

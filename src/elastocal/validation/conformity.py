@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from elastocal.fitting.observations import States
     from elastocal.mechanics.robot import Robot
 
-# The largest error of so many configurations bounds 69 % of all others at 95 %
-# confidence; that of fewer bounds little more than half.
+# The largest error of this number of configurations bounds 69 % of all others at 95 %
+# confidence; the largest error of fewer bounds little more than half.
 MIN_CONFIGURATIONS = 8
 # Over this rotation, an error that is a sine of a joint's angle changes by half of its
 # amplitude. Over a smaller one it is hardly distinguishable from a constant.

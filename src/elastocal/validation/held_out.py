@@ -106,7 +106,7 @@ def compute_position_residuals(
 def compute_errors_as_read(
     model: Model, estimate: Estimate, observations: Observations, plan: MeasuringPlan
 ) -> np.ndarray:
-    """Compute what a kind such as `board` reads less what a model predicts that it reads.
+    """Compute measured minus predicted numbers of a kind such as `board`.
 
     Its measurements are fitted as poses of the target, whose errors differ: a rotation of
     a board moves a camera that sees it by the range.

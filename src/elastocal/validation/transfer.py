@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Case, Estimate, Model
     from elastocal.fitting.observations import Observations, States
 
-# Of more observations than this, a sample shows how certain the predictions of fitted
-# poses are.
+# Upper bound on the observations from which the certainty of predictions at fitted poses
+# is computed; of more observations a sample is used.
 _MAX_FITTED = 10_000
 # Rounding of forces and moments: as a share, and in N or N m. Forces of one load cell
 # are given to a few digits.
@@ -144,10 +144,10 @@ def keep_transferable_effects(fitted: Fit, model: Model, states: States) -> Fit:
 def find_extrapolated_poses(fitted: Fit, case: Case, held_out: Case) -> np.ndarray:
     """Find poses outside the range of the fitted poses, where a model extrapolates.
 
-    Either a joint stands beyond the fitted poses by more than chance explains, see
+    Either a joint is beyond the fitted poses by more than chance explains, see
     `holdout.find_poses_beyond_range`; or the predicted position is less certain than at
-    any fitted pose, had that pose been left out. The second criterion finds what ranges
-    joint by joint miss: corners between the poses, and loads, times and temperatures
+    any fitted pose that is left out of the fit. Unlike the ranges of single joints, the
+    second criterion finds corners between the poses, and loads, times and temperatures
     beyond the fitted ones. A pose drawn like the P fitted ones exceeds their maximum
     with probability 1 / (P + 1) at most, because all are exchangeable: the argument of
     conformal prediction [1]_.

@@ -37,7 +37,7 @@ _CARRIER_RADII = 2.5
 
 @dataclass(frozen=True)
 class Cell:
-    """What stands around the robot; lengths in m, base axes.
+    """Surroundings of the robot; lengths in m, base axes.
 
     Attributes
     ----------

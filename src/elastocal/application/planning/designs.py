@@ -1,13 +1,14 @@
 """Optimal designs: the best subset of many candidates by a criterion.
 
-M is the information matrix in units of the plausible sizes of the parameters. A prior of
-one plausible size each makes it I without any measurement (a Bayesian design [1], which
-needs no identifiable parameters). A candidate with rows Z changes it to M + Z' Z, and
+M is the information matrix in units of the plausible sizes of the parameters. Each
+parameter has a prior of one plausible size, so M = I before any measurement (a Bayesian
+design [1], in which not all parameters need to be identifiable). A candidate with rows Z
+changes M to M + Z' Z, and
 
 - D: log det M grows by log det (I + Z M^-1 Z'), by the matrix determinant lemma;
 - A and I: tr C M^-1 falls by tr (I + Z M^-1 Z')^-1 Z M^-1 C M^-1 Z', by Woodbury's
   identity. C is I over the number of parameters for A, and for I the mean of G' G over
-  the poses at which the robot shall be accurate, with the sensitivities G there.
+  the poses at which the robot should be accurate, with the sensitivities G there.
 
 The choice is greedy, followed by Fedorov's exchange [2].
 

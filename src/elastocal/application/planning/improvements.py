@@ -39,7 +39,7 @@ def compare_improvements(
 
     Returns
     -------
-    RMS errors, m, by the change in words; all in the same sense as that of the plan.
+    RMS errors, m, by the change in words; all defined as that of the plan.
     """
     changes = {"": (survey, 1)}
     names = {target.name for target in survey.targets}
@@ -62,7 +62,8 @@ def compare_improvements(
 
 
 def _add_reflectors(target: Target, names: set[str]) -> list[Target]:
-    """Make two reflectors beside one, across its frame, known as well as it is."""
+    """Make two further reflectors along two axes of a target's frame, whose offsets are as
+    uncertain as its own."""
     std = _UNKNOWN_OFFSET_M if target.offset_m is None else target.offset_std_m
     reflectors = []
     for axis in range(2):

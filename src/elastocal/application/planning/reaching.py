@@ -45,7 +45,7 @@ _SINGULAR_SHARE = 1e-3
 
 @dataclass(frozen=True)
 class SetUp:
-    """What a robot is measured by without a tracker, and where it roughly stands.
+    """Set-up of a measurement without a tracker: its kind and its approximate places.
 
     Attributes
     ----------
@@ -70,8 +70,8 @@ class SetUp:
         return not self.kind.reads_poses
 
     def locate_session(self) -> tuple[np.ndarray, np.ndarray]:
-        """Locate the frame of the session in the base, (3,) m and (3, 3). Features are
-        described in the base, a board is a frame of its own."""
+        """Locate the frame of the session in the base, (3,) m and (3, 3). It is the base
+        itself if there are features, and otherwise the frame of the board."""
         if self.has_features:
             return np.zeros(3), np.eye(3)
         (place,) = self.places.values()

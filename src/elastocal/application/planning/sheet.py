@@ -87,8 +87,8 @@ def _name_features(survey: Survey, plan: Plan) -> list[str]:
 
 
 def clear_joint_angles(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of a sheet with columns of joint angles to be filled in, because
-    only those of the contact count."""
+    """Return the rows of a sheet with empty columns of joint angles, because only the
+    joint angles at the contact count."""
     planned = [name for name in map(str, table) if name.startswith("q")]
     displayed = [name for name in planned if "_" in name]
     exact = [name for name in planned if "_" not in name]
@@ -96,8 +96,8 @@ def clear_joint_angles(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _format_joints(survey: Survey, angles: np.ndarray) -> dict[str, float]:
-    """Return the cells of joint angles (n,): as the controller shows them, then exactly
-    these rounded values in rad and m, so that what is typed is what is planned."""
+    """Return the cells of joint angles (n,): rounded as the controller shows them, and the
+    same rounded values in rad and m, so that the typed angles are the planned ones."""
     shown = {}
     exact = {}
     joints = zip(angles, survey.robot.prismatic_commands, strict=True)

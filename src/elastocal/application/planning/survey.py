@@ -1,12 +1,12 @@
-"""What is measured in each configuration, how accurately, and what it says about the
-parameters of the robot.
+"""Planned measurements in each configuration, their accuracy, and their information
+about the parameters of the robot.
 
 The model is the one that a campaign declares: offsets of the joints, lengths and angles
 of the links, joint compliances if loads are measured, errors of declared masses, and the
 placement of base and targets if they are unknown. Sensitivities are those of the fit
 itself, at the values of the robot file.
 
-Without a tracker, where features are is unknown too, and is fitted with the robot.
+Without a tracker, the places of features are unknown too, and are fitted with the robot.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ _CHUNK = 1000
 
 @dataclass(frozen=True)
 class Survey:
-    """What is measured in each configuration, and how accurately.
+    """Planned measurements in each configuration, and their accuracy.
 
     Attributes
     ----------
