@@ -84,6 +84,10 @@ def test_views_show_boxes_tracker_and_both_kinds_of_poses():
     assert labels == ["to fit", "held out", "excluded", "tracker", "base", *curves]
     bare = draw_plan(survey.robot, OPEN, plan)
     assert legend_entries(bare) == ["to fit", "held out", "base", *curves]
+    places = {"left": np.array([0.4, 0.1, 0.0]), "right": np.array([0.4, -0.1, 0.0])}
+    without_tracker = draw_plan(survey.robot, OPEN, plan, places)
+    labels = legend_entries(without_tracker)
+    assert labels == ["to fit", "held out", "left", "right", "base", *curves]
     last = figure.axes[2].lines[-1].get_ydata()[-1]
     np.testing.assert_allclose(last, 1e3 * plan.accuracy_m[-1])
 

@@ -26,7 +26,9 @@ from elastocal.counting import format_count
 from elastocal.errors import InputError, find_text_fault
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
+
+    import numpy as np
 
     from elastocal.application.planning.cell import Cell
     from elastocal.application.planning.plan import Plan
@@ -202,7 +204,7 @@ def plan(
         pull,
         setup,
     )
-    cell = _read_cell(arm, box or (), tracker, floor)
+    cell = _read_cell(arm, box or (), tracker, floor, setup)
     _check_new_folder(folder)
     with console.status("planning"):
         candidates = find_allowed_candidates(survey, cell, number, seed)
@@ -290,7 +292,11 @@ def _check_new_folder(folder: Path) -> None:
 
 
 def _read_cell(
-    arm: Robot, boxes: Iterable[str], tracker: str | None, floor_m: float
+    arm: Robot,
+    boxes: Iterable[str],
+    tracker: str | None,
+    floor_m: float,
+    setup: SetUp | None,
 ) -> Cell:
     """Read boxes and the tracker's position; radii are shares of the arm's reach."""
     from elastocal.application.planning.cell import build_cell
@@ -306,7 +312,9 @@ def _read_cell(
                 "xmin,xmax,ymin,ymax,zmin,zmax with each min below its max",
             )
         corners.append(box)
-    tracker_m = None if tracker is None else parse_numbers("--tracker", tracker, 3)
+    tracker_m = None if setup is None else setup.find_viewpoint()
+    if tracker is not None:
+        tracker_m = parse_numbers("--tracker", tracker, 3)
     return build_cell(arm, corners, tracker_m, floor_m)
 
 
@@ -410,6 +418,11 @@ def _describe_tool(survey: Survey) -> str:
     return "The offset of the tool is in it, known as well as that of the reflectors."
 
 
+def _find_places(survey: Survey) -> Mapping[str, np.ndarray]:
+    """Find what pictures show beside the cell: features, board or camera by name."""
+    return survey.setup.places if survey.setup is not None else {}
+
+
 def _write_campaign(
     folder: Path,
     robot_file: Path,
@@ -452,7 +465,9 @@ def _write_campaign(
         write_text(partial / ROBOT, read_text(robot_file, LARGEST_BYTES))
         for name, rows in written.items():
             write_csv(partial / name, rows)
-        figures = {"overview": draw_plan(survey.robot, cell, chosen)}
+        figures = {
+            "overview": draw_plan(survey.robot, cell, chosen, _find_places(survey))
+        }
         for page, figure in enumerate(draw_poses(survey.robot, chosen)):
             figures[f"poses{page}"] = figure
         with tempfile.TemporaryDirectory() as scratch:

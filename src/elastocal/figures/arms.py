@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +22,8 @@ from elastocal.figures.style import (
 from elastocal.mechanics.kinematics import compute_poses
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -172,13 +174,26 @@ def _draw_errors(
 
 
 @styled
-def draw_plan(robot: Robot, cell: Cell, plan: Plan) -> Figure:
+def draw_plan(
+    robot: Robot, cell: Cell, plan: Plan, places: Mapping[str, np.ndarray] | None = None
+) -> Figure:
     """Draw the planned configurations in the cell, and the accuracy against the number
-    of poses."""
+    of poses.
+
+    Parameters
+    ----------
+    robot, cell, plan
+        The robot, what is around it, and the configurations.
+    places : mapping, optional
+        Of features or a camera by name, base axes: the first three numbers are the
+        position, m. The cell has a tracker only without them.
+    """
     figure, axes = create_panels(1, 3, 72)
     for axis, (title, right, up) in zip(axes[0], _VIEWS, strict=False):
         _draw_plan_view(axis, robot, plan, (right, up))
-        _draw_cell(axis, cell, (right, up))
+        _draw_cell(axis, replace(cell, tracker_m=None) if places else cell, (right, up))
+        for name, place in (places or {}).items():
+            axis.plot(place[right], place[up], "^", color=PALETTE[2], ms=6, label=name)
         axis.plot(0.0, 0.0, "k+", ms=8, label="base")
         axis.set(xlabel=f"{'xyz'[right]} (m)", ylabel=f"{'xyz'[up]} (m)", title=title)
         axis.set_aspect("equal", adjustable="box")

@@ -98,6 +98,13 @@ def test_lengths_and_strokes_stay_within_their_limits(kind):
         assert np.std(along) > 2e-3
 
 
+def test_only_a_camera_beside_the_robot_has_a_line_of_sight_that_the_arm_may_hide():
+    beside = make_kind_survey("board", "beside_robot").setup
+    np.testing.assert_allclose(beside.find_viewpoint(), [1.2, 0.0, 0.6])
+    assert make_kind_survey("board").setup.find_viewpoint() is None
+    assert make_kind_survey("point").setup.find_viewpoint() is None
+
+
 def test_a_board_that_the_robot_cannot_see_is_refused():
     survey = make_kind_survey("board", place=[0.0, 0.0, 4.0, 0.0, 0.0, 1.0])
     with pytest.raises(InputError, match=r"--place board.*none of"):

@@ -49,7 +49,7 @@ _FORBIDDEN = {
     "boxes": "the boxes leave the arm no room",
     "floor": "forearm or target would be below the floor (--floor)",
     "column": "forearm or hand would be in the robot's own column",
-    "sight": "the tracker sees the targets in none",
+    "sight": "the tracker or camera sees the targets in none",
 }
 # Largest angle (rad, or m) of a move below which an exchange in a tour is rounding.
 _ROUNDING = 1e-12

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elastocal.measuring.board import BESIDE_ROBOT
 from elastocal.measuring.protocol import orient
 from elastocal.mechanics.chain import MeasuringPoint
 from elastocal.mechanics.kinematics import (
@@ -68,6 +69,13 @@ class SetUp:
     def has_features(self) -> bool:
         """Whether each row refers to a feature; otherwise to the frame of the session."""
         return not self.kind.reads_poses
+
+    def find_viewpoint(self) -> np.ndarray | None:
+        """Find the camera beside the robot, (3,) m, whose line of sight to the target the
+        arm may hide; None for others."""
+        if self.has_features or self.options["camera"] != BESIDE_ROBOT:
+            return None
+        return self.locate_session()[0]
 
     def locate_session(self) -> tuple[np.ndarray, np.ndarray]:
         """Locate the frame of the session in the base, (3,) m and (3, 3). It is the base
