@@ -45,7 +45,7 @@ def measure(seed, noise_rad, count=60):
 
 def read_positions(rows):
     """Positions (N, 3), m, of the board in the camera."""
-    return np.column_stack([[row[name] for row in rows] for name in "xyz"])
+    return np.array([(row["x"], row["y"], row["z"]) for row in rows])
 
 
 @pytest.mark.parametrize("camera", ["on_robot", "beside_robot"])
