@@ -65,6 +65,19 @@ def test_each_panel_has_its_errors_and_their_rms(table):
     )
 
 
+def test_the_arm_is_drawn_at_the_angles_of_the_chain(table):
+    """The residuals table has angles of the chain, not those that the controller
+    reports."""
+    robot = analysed("kuka")
+    turned = replace(robot, reported_offset=np.full(6, 0.5))
+    lines = [
+        draw_arm_with_errors(arm, table, CAMPAIGNS["named"].heldout).axes[0].lines
+        for arm in (robot, turned)
+    ]
+    for line, of_turned in zip(*lines, strict=True):
+        np.testing.assert_array_equal(line.get_xydata(), of_turned.get_xydata())
+
+
 def test_views_show_boxes_tracker_and_both_kinds_of_poses():
     survey = make_survey()
     plan = choose_plan(survey, make_candidates(survey, 300), 14, 4, 1)

@@ -19,6 +19,7 @@ from elastocal.figures.style import (
     label_decades,
     styled,
 )
+from elastocal.loop.schemas import stack_joint_angles
 from elastocal.mechanics.kinematics import compute_poses
 
 if TYPE_CHECKING:
@@ -111,11 +112,9 @@ def draw_arm_with_errors(robot: Robot, table: Columns, heldout: HeldOut) -> Figu
         Errors of the validation poses; the titles state its RMS errors.
     """
     held_out = table["held_out"].astype(bool)
-    angles = np.column_stack(
-        [table[f"q{joint}"][held_out] for joint in range(1, robot.joints + 1)]
-    )
+    angles = stack_joint_angles(table, robot.joints)[held_out]
     positions = np.column_stack([table[axis][held_out] for axis in "xyz"])
-    arms = _compute_links(robot, robot.model_angles(np.unique(angles, axis=0)))
+    arms = _compute_links(robot, np.unique(angles, axis=0))
     # Draw the arm in full that reaches farthest to a side.
     full_arm = arms[np.argmax(np.abs(project_view(arms[:, -1])[:, 0]))]
     figure, axes = create_panels(1, 2, 78, sharex=True, sharey=True)
