@@ -1,6 +1,10 @@
 """Components of displacements and wrenches, as all tables have them."""
 
-from elastocal.mechanics.components import COMPONENT_NAMES, WRENCH_NAMES
+from elastocal.mechanics.components import (
+    COMPONENT_NAMES,
+    WRENCH_NAMES,
+    list_joint_columns,
+)
 from elastocal.study.schemas import DEFLECTIONS, EXPERIMENTS
 
 
@@ -16,3 +20,8 @@ def test_a_force_and_the_displacement_along_it_have_the_same_index():
         assert moved[1] == load[1]
         for name in (moved, load):
             assert f"base {name[1]}," in columns[name].meaning
+
+
+def test_quantities_of_joints_are_numbered_from_one():
+    assert list_joint_columns(3) == ["q1", "q2", "q3"]
+    assert list_joint_columns(2, "approach") == ["approach1", "approach2"]

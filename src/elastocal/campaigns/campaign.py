@@ -13,7 +13,11 @@ import numpy as np
 from elastocal.errors import InputError, suggest_names
 from elastocal.measuring.channels import MeasuringPlan, parse_measuring
 from elastocal.mechanics.chain import Chain
-from elastocal.mechanics.components import COMPONENT_NAMES, WRENCH_NAMES
+from elastocal.mechanics.components import (
+    COMPONENT_NAMES,
+    WRENCH_NAMES,
+    list_joint_columns,
+)
 from elastocal.mechanics.robot import Robot
 
 DOCUMENT = "campaign.yaml"
@@ -293,14 +297,13 @@ _IDENTITY = ("session", "pose", "load", "repeat", "target", "row")
 def _columns_by_field(joints: int) -> dict[str, Sequence[str]]:
     """Return the columns of the measurements table that hold each field of
     `Measurements`."""
-    numbers = range(1, joints + 1)
     columns: dict[str, Sequence[str]] = {name: (name,) for name in _IDENTITY}
     return columns | {
-        "joint_angles": [f"q{joint}" for joint in numbers],
+        "joint_angles": list_joint_columns(joints),
         "wrench": WRENCH_NAMES,
         "position": "xyz",
         "rotation_vector": ("rx", "ry", "rz"),
-        "approach": [f"approach{joint}" for joint in numbers],
+        "approach": list_joint_columns(joints, "approach"),
         "time_s": ("time_s",),
         "temperature_c": ("temperature_c",),
         "u95_m": ("u95_m",),

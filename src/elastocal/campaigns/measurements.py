@@ -20,7 +20,7 @@ from elastocal.errors import InputError, suggest_names
 from elastocal.io.atomic_writes import write_atomically
 from elastocal.io.storage import Column, read_schemas
 from elastocal.io.texts import describe_file_kind
-from elastocal.mechanics.components import WRENCH_NAMES
+from elastocal.mechanics.components import WRENCH_NAMES, list_joint_columns
 
 # Upper bounds on a file. The diagnosis of a million measurements takes 2 GB (see
 # benchmarks); a tracker's stream is averaged before it is written to a file.
@@ -129,10 +129,9 @@ def read_measurements(folder: Path, joints: int, numbers: Sequence[str]) -> Cell
 def _check_required_columns(table: Cells, joints: int, measured: Sequence[str]) -> None:
     """Refuse a table that lacks a column, or some of the columns of wrench or approach."""
     present = table.columns.keys()
-    numbers = range(1, joints + 1)
-    approach = [f"approach{joint}" for joint in numbers]
+    approach = list_joint_columns(joints, "approach")
     required = ["pose", "load", "repeat", "target"]
-    required += [f"q{joint}" for joint in numbers]
+    required += list_joint_columns(joints)
     required += measured
     for optional in (WRENCH_NAMES, approach):
         if present & {*optional}:
@@ -186,7 +185,7 @@ def convert_column(table: Cells, column: Column) -> np.ndarray:
 
 def name_joint_columns(angles: np.ndarray) -> dict[str, np.ndarray]:
     """Return the columns of joint angles (N, n) by their names."""
-    return {f"q{joint}": column for joint, column in enumerate(angles.T, 1)}
+    return dict(zip(list_joint_columns(angles.shape[1]), angles.T, strict=True))
 
 
 def tabulate_single_measurements(

@@ -37,7 +37,7 @@ from elastocal.campaigns.tables import Cells
 from elastocal.counting import format_count
 from elastocal.errors import InputError, suggest_names
 from elastocal.measuring.channels import MeasuringPlan, parse_measuring
-from elastocal.mechanics.components import WRENCH_NAMES
+from elastocal.mechanics.components import WRENCH_NAMES, list_joint_columns
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import parse_robot
 
@@ -241,7 +241,7 @@ def _build_measurements(
 ) -> Measurements:
     """Return the measurements of a table, still without the numbers that were measured;
     angles in degrees and unknown targets are refused."""
-    reported = table.matrix(_joint_columns("q", robot))
+    reported = table.matrix(list_joint_columns(robot.commands))
     _refuse_degrees(reported, table, robot)
     count = len(table.rows)
 
@@ -266,10 +266,6 @@ def _build_measurements(
         u95_m=optional("u95_m"),
         row=table.rows,
     )
-
-
-def _joint_columns(prefix: str, robot: Robot) -> list[str]:
-    return [f"{prefix}{joint}" for joint in range(1, robot.commands + 1)]
 
 
 def _refuse_degrees(reported: np.ndarray, table: Cells, robot: Robot) -> None:
@@ -304,7 +300,7 @@ def _approach_directions(table: Cells, robot: Robot) -> np.ndarray | None:
     of -1, 0 or 1; None if the table does not state it."""
     if "approach1" not in table.columns:
         return None
-    names = _joint_columns("approach", robot)
+    names = list_joint_columns(robot.commands, "approach")
     approach = table.matrix(names)
     table.refuse(~np.isin(approach, (-1.0, 0.0, 1.0)), names, "-1, 0 or 1")
     # If a joint of the model is the sum of two reported joints that came from opposite
@@ -376,7 +372,7 @@ def _refuse_poses_of_different_angles(
     """Refuse measurements of one pose whose joint angles differ by more than a servo
     error."""
     pose = list_poses(measurements)[1]
-    names = _joint_columns("q", robot)
+    names = list_joint_columns(robot.commands)
     reported = table.matrix(names)
     first = np.unique(pose, return_index=True)[1]
     apart = np.abs(reported - reported[first[pose]]) > SAME_POSE_RAD

@@ -26,6 +26,7 @@ import numpy as np
 from scipy.constants import g as standard_gravity
 from scipy.special import ndtr
 
+from elastocal.campaigns.measurements import name_joint_columns
 from elastocal.diagnosis.candidate_design import WhitenedFit
 from elastocal.diagnosis.refit import predict_reduced_chi_square
 from elastocal.diagnosis.statistics import assemble_normal_equations
@@ -507,12 +508,11 @@ def _build_table(
 ) -> Table:
     """Columns of proposed poses; effect and point are empty."""
     count = len(angles)
-    reported = robot.reported_angles(angles).T
     return {
         "effect": np.full(count, ""),
         "pose": np.arange(count),
         "point": np.full(count, ""),
-        **{f"q{joint}": angle for joint, angle in enumerate(reported, 1)},
+        **name_joint_columns(robot.reported_angles(angles)),
         **dict(zip(WRENCH_NAMES, wrench.T, strict=True)),
         "separation": separation,
         "resolved": compute_resolution_probability(separation),

@@ -20,6 +20,7 @@ from elastocal.exchange.column_names import (
     recognize_column,
 )
 from elastocal.io.documents import read_document
+from elastocal.mechanics.components import list_joint_columns
 from elastocal.mechanics.robot import Robot
 
 _YAML = (".yaml", ".yml")
@@ -70,7 +71,7 @@ def read_joint_angles(
 
     text = read_text_table(path, is_header, wanted=_HEADER, units_in=read_units)
     columns, stated_units = find_columns(text, {}, robot)
-    wanted = [f"q{joint}" for joint in range(1, robot.commands + 1)]
+    wanted = list_joint_columns(robot.commands)
     missing = [name for name in wanted if name not in columns]
     if missing:
         raise InputError(path, "header", f"no column {missing[0]!r}", _HEADER)

@@ -40,7 +40,7 @@ from elastocal.exchange.pose_table import (
 )
 from elastocal.exchange.target_path import NO_BOUND, OK
 from elastocal.exchange.times import read_times
-from elastocal.mechanics.components import WRENCH_NAMES
+from elastocal.mechanics.components import WRENCH_NAMES, list_joint_columns
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -153,7 +153,7 @@ def read_corrected_targets(path: str | Path, joints: int) -> CorrectedTargets:
         allowed = "the table that elastocal correct wrote; --targets FILE names it"
         raise InputError(source, "", "no such file", allowed)
     text = read_text_table(path, lambda _: True, Dialect("comma", "point"))
-    angles = [f"q{joint}" for joint in range(1, joints + 1)]
+    angles = list_joint_columns(joints)
     names = [*angles, *_ERRORS, *_POSE, *WRENCH_NAMES]
     missing = [name for name in (*names, _BOUND, "status") if name not in text.columns]
     if missing:
@@ -188,7 +188,7 @@ def arrange_corrected_targets(table: pd.DataFrame, joints: int) -> CorrectedTarg
     rotation = np.full((len(usable), 3, 3), np.nan)
     vectors = table[[*ROTATION]].to_numpy(float)
     rotation[usable] = Rotation.from_rotvec(vectors[usable]).as_matrix()
-    angles = [f"q{joint}" for joint in range(1, joints + 1)]
+    angles = list_joint_columns(joints)
     return CorrectedTargets(
         usable,
         table[angles].to_numpy(float),
@@ -243,7 +243,7 @@ def read_target_measurements(
     columns, stated_units = find_columns(text, {}, robot)
     notation = find_rotation(text, columns, _state_notation(text))
     table = PoseTable(text, columns, stated_units, notation)
-    angles = [f"q{joint}" for joint in range(1, robot.commands + 1)]
+    angles = list_joint_columns(robot.commands)
     if not all(name in columns for name in angles):
         angles = []
     wanted = [*POSITION, *table.orientation, *angles]

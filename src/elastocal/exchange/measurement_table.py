@@ -44,7 +44,7 @@ from elastocal.exchange.pose_table import (
 )
 from elastocal.exchange.times import find_times_of_day, read_times
 from elastocal.exchange.unwrapping import unwrap_into_limits
-from elastocal.mechanics.components import WRENCH_NAMES
+from elastocal.mechanics.components import WRENCH_NAMES, list_joint_columns
 from elastocal.mechanics.robot import Robot
 
 # What programs write into a cell without a measurement.
@@ -406,7 +406,7 @@ def _check_complete(layout: PoseTable, robot: Robot | None) -> None:
             f"{robot.commands}, as {robot.name} has; --ignore NAME leaves a column out",
         )
     joints = robot.commands if robot else int(angles[-1][1:])
-    all_angles = [f"q{joint}" for joint in range(1, joints + 1)]
+    all_angles = list_joint_columns(joints)
     for needed in (all_angles, [*layout.position, *layout.orientation]):
         missing = [name for name in needed if name not in columns]
         if missing:

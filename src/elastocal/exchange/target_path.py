@@ -36,7 +36,7 @@ from elastocal.exchange.pose_table import (
     read_cells,
     read_rotation_vectors,
 )
-from elastocal.mechanics.components import WRENCH_NAMES
+from elastocal.mechanics.components import WRENCH_NAMES, list_joint_columns
 from elastocal.mechanics.robot import Robot
 
 _POSE = (*POSITION, *VECTOR)
@@ -112,7 +112,7 @@ def read_target_path(
         cell is not a number, or no arm reaches a pose.
     """
     check_option_names(options)
-    angles = tuple(f"q{joint}" for joint in range(1, joints + 1))
+    angles = tuple(list_joint_columns(joints))
     table, options = _find_poses(read_cells(path, options), angles, options, robot)
     text = table.text
     units = find_units(

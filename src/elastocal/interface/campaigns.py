@@ -27,7 +27,7 @@ from elastocal.loop.loading import (
     describe_campaign,
     read_described_campaign,
 )
-from elastocal.mechanics.components import WRENCH_NAMES
+from elastocal.mechanics.components import WRENCH_NAMES, list_joint_columns
 from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import describe_robot
 
@@ -159,7 +159,7 @@ class Campaign:
 
         check_instance(_SOURCE, "robot", robot, Robot, ROBOT_ALLOWED)
         check_instance(_SOURCE, "table", table, pd.DataFrame, "a DataFrame of pandas")
-        angles = _name_angles(robot)
+        angles = list_joint_columns(robot.commands)
         needed = [*angles, *"xyz"]
         if any(name in table for name in ROTATION):
             needed += ROTATION
@@ -310,7 +310,7 @@ def _arrange(
     row, target = np.nonzero(~np.isnan(positions).all(axis=2))
     if not len(row):
         raise InputError(_SOURCE, "positions", "no measured position", "one or more")
-    values = _name_columns(_name_angles(robot), angles[row])
+    values = _name_columns(list_joint_columns(robot.commands), angles[row])
     values |= _name_columns("xyz", positions[row, target])
     if arrays["rotation_vectors"] is not None:
         turns = _check_targets(
@@ -350,11 +350,6 @@ def _check_wrenches(values: ArrayLike | None, count: int) -> np.ndarray:
     return check_array(_SOURCE, "wrenches", array, (count, 6))
 
 
-def _name_angles(robot: Robot) -> list[str]:
-    """Names of the columns with the joint angles of a robot."""
-    return [f"q{joint}" for joint in range(1, robot.commands + 1)]
-
-
 def _name_columns(names: Iterable[str], values: np.ndarray) -> dict[str, np.ndarray]:
     """Name the columns of an array (M, k)."""
     return dict(zip(names, values.T, strict=True))
@@ -368,7 +363,7 @@ def _make_table(rows: _Rows, robot: Robot) -> Cells:
             allowed = suggest_names(name, sorted(described))
             raise InputError(_SOURCE, "columns", repr(name), allowed)
     headers = {name: f"columns[{name!r}]" for name in rows.columns}
-    angles = _name_angles(robot)
+    angles = list_joint_columns(robot.commands)
     for argument, names in (
         ("joint_angles", angles),
         ("positions", "xyz"),

@@ -52,7 +52,7 @@ from elastocal.loop.verification import (
     list_reflectors,
     verify_robot,
 )
-from elastocal.mechanics.components import WRENCH_NAMES
+from elastocal.mechanics.components import WRENCH_NAMES, list_joint_columns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -406,7 +406,7 @@ def _arrange_path(table: pd.DataFrame, joints: int) -> TargetPath:
 
     check_instance("correct", "path", table, pd.DataFrame, "a DataFrame or a file")
     pose = [*"xyz", *ROTATION]
-    angles = [f"q{joint}" for joint in range(1, joints + 1)]
+    angles = list_joint_columns(joints)
     has_angles = any(name in table for name in angles)
     needed = pose + angles if has_angles else pose
     missing = next((name for name in needed if name not in table), None)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.io.storage import read_schemas, read_table
+from elastocal.mechanics.components import list_joint_columns
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -45,7 +46,7 @@ def find_worst_measurement(table: Mapping[str, np.ndarray]) -> int:
 
 def stack_joint_angles(table: Mapping[str, np.ndarray], joints: int) -> np.ndarray:
     """Return the joint angles (N, n) of a residuals table, those of the chain, rad."""
-    return np.column_stack([table[f"q{joint}"] for joint in range(1, joints + 1)])
+    return np.column_stack([table[name] for name in list_joint_columns(joints)])
 
 
 def find_worst_joint_angles(table: Mapping[str, np.ndarray], joints: int) -> np.ndarray:

@@ -18,6 +18,7 @@ from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.components import (
     COMPONENT_NAMES,
     WRENCH_NAMES,
+    list_joint_columns,
 )
 from elastocal.mechanics.elastostatics import (
     build_extended_chain,
@@ -277,7 +278,7 @@ def pack_experiments(
 def unpack_experiments(columns: Columns) -> Experiments:
     """Unpack the experiments of a block."""
     joints = sum(name[0] == "q" for name in columns)
-    angles = [f"q{j}" for j in range(1, joints + 1)]
+    angles = list_joint_columns(joints)
     return Experiments(
         _stack_components(columns, angles), _stack_components(columns, WRENCH_NAMES)
     )
