@@ -1,6 +1,7 @@
 """The oracle knows the effect and its joints and is judged like the diagnosis."""
 
 import json
+from types import SimpleNamespace
 
 import pytest
 from analysed_robots import ROBOTS
@@ -9,6 +10,7 @@ from made_blind_documents import PLAN
 from elastocal.effects.catalogue import candidates_on
 from elastocal.loop.whole import diagnose_folder
 from elastocal.mechanics.sites import build_sites
+from elastocal_proof.blind import oracle
 from elastocal_proof.blind.cases import BlindCase, write_sealed_case
 from elastocal_proof.blind.oracle import (
     fit_oracle,
@@ -37,7 +39,15 @@ def test_a_variant_consists_of_the_candidates_at_the_true_joints(list_keys):
     assert locations == {"link_weight@2", "link_weight@3"}
 
 
-def test_the_oracle_fits_what_the_diagnosis_names_rightly(tmp_path):
+def run_without_terms(monkeypatch, truth, verdict, folder):
+    """Run the oracle as if the measurements could test nothing at all."""
+    with monkeypatch.context() as patch:
+        nothing = SimpleNamespace(terms=())
+        patch.setattr(oracle, "build_candidate_design", lambda *arguments: nothing)
+        return fit_oracle(truth, verdict, folder, ROBOTS.as_posix(), 1)
+
+
+def test_the_oracle_fits_what_the_diagnosis_names_rightly(tmp_path, monkeypatch):
     # The arm weighs nothing, so that the diagnosis is fast.
     setting = "weight_compensated"
     case = BlindCase(
@@ -56,6 +66,9 @@ def test_the_oracle_fits_what_the_diagnosis_names_rightly(tmp_path):
     folder = (tmp_path / "blind" / case.name).as_posix()
     verdict = diagnose_folder(folder, ROBOTS.as_posix(), 1)
     assert [effect["name"] for effect in verdict["effects"]] == ["joint_offset"]
+    oracle_of_untestable = run_without_terms(monkeypatch, truth, verdict, folder)
+    assert oracle_of_untestable["candidates"] == []
+    assert oracle_of_untestable["p_value"] == 1.0
     informed = fit_oracle(truth, verdict, folder, ROBOTS.as_posix(), 1)
     [joint] = truth["defects"][0]["joints"]
     assert informed["candidates"] == [f"joint_offset@{joint}"]

@@ -147,9 +147,10 @@ def _score_variants(
     at its best shapes."""
     variants = list_variants(effect, joints, case.candidates.values())
     candidates = [candidate for variant in variants for candidate in variant]
-    problem = build_candidate_design(
-        declared, case.observations, candidates, Settings()
-    ).problem
+    design = build_candidate_design(declared, case.observations, candidates, Settings())
+    if not design.terms:
+        return []
+    problem = design.problem
     best: dict[str, _ScoredCandidate] = {}
     _, log_bayes_factors = screen_terms(problem)
     for term, log_factor in zip(problem.terms, log_bayes_factors, strict=True):
