@@ -68,8 +68,10 @@ def list_plugin_names(group: str) -> list[str]:
 
 def list_plugin_versions() -> dict[str, str]:
     """List the versions of the installed packages that offer plug-ins, by their names."""
+    # Each call reads the metadata of every installed package.
+    offered = entry_points()
     distributions = [
-        entry.dist for group in GROUPS for entry in entry_points(group=group)
+        entry.dist for group in GROUPS for entry in offered.select(group=group)
     ]
     return {
         distribution.name: distribution.version
