@@ -6,6 +6,7 @@ They are the closure of its imports, read from the sources without running them.
 import ast
 from functools import cache
 from itertools import accumulate
+from operator import attrgetter
 from pathlib import Path
 
 import grimp
@@ -45,15 +46,11 @@ def closure(script: Path, source: Path, *named: str) -> list[Path]:
         modules |= _imports(file) & _graph().modules
     modules |= {upstream for name in modules for upstream in _upstream(name)}
     for name in modules:
-        # A module is imported with the packages that contain it.
-        for package in accumulate(name.split("."), "{}.{}".format):
-            if package.split(".")[0] in PACKAGES:
-                files.add(_file(package, source))
-    # A module may read a data file that stands beside it under the same name.
+        files |= _files_of_module(name, source)
     for file in [*files]:
-        data_files = map(file.with_suffix, DATA_SUFFIXES)
-        files |= {data_file for data_file in data_files if data_file.is_file()}
-    return sorted(files - {script})
+        files |= _data_files(file)
+    # The parts of paths compare faster than the paths, and alike.
+    return sorted(files - {script}, key=attrgetter("parts"))
 
 
 def _files_in_own_folder(script: Path) -> set[Path]:
@@ -63,9 +60,34 @@ def _files_in_own_folder(script: Path) -> set[Path]:
     while pending:
         file = pending.pop()
         files.add(file)
-        siblings = {file.with_name(f"{name}.py") for name in _imports(file)}
-        pending += {sibling for sibling in siblings if sibling.is_file()} - files
+        pending += _imported_siblings(file) - files
     return files
+
+
+# The rules share most of their modules, so the questions to the disk are cached.
+@cache
+def _imported_siblings(file: Path) -> frozenset[Path]:
+    """Return the files of a script's folder that it imports itself."""
+    siblings = (file.with_name(f"{name}.py") for name in _imports(file))
+    return frozenset(sibling for sibling in siblings if sibling.is_file())
+
+
+@cache
+def _files_of_module(module: str, source: Path) -> frozenset[Path]:
+    """Return the file of a module of the packages and those of the packages that contain
+    it, which are imported with it."""
+    names = accumulate(module.split("."), "{}.{}".format)
+    return frozenset(
+        _file(name, source) for name in names if name.split(".")[0] in PACKAGES
+    )
+
+
+@cache
+def _data_files(file: Path) -> frozenset[Path]:
+    """Return the data files that a module may read, because they stand beside it under
+    the same name."""
+    data_files = map(file.with_suffix, DATA_SUFFIXES)
+    return frozenset(data_file for data_file in data_files if data_file.is_file())
 
 
 @cache
