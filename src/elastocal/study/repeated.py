@@ -175,22 +175,49 @@ def _sum_over_prefixes(
     )
 
 
-def estimate_errors(
-    strategy: Strategy, equations: Mapping[str, PrefixEquations], joints: int
-) -> np.ndarray:
-    """Solve the stages of a strategy one after the other.
+def solve_stage(
+    stage: Stage,
+    equations: Mapping[str, PrefixEquations],
+    earlier: Mapping[int, np.ndarray],
+) -> dict[int, np.ndarray]:
+    """Solve a stage of a strategy.
+
+    Parameters
+    ----------
+    stage
+    equations
+        Of each measuring point, by its name.
+    earlier
+        Relative errors (configurations, sets) by joint, from the earlier stages.
 
     Returns
     -------
-    (n, configurations, sets) array
-        Relative errors of the compliances.
+    dict of (configurations, sets) arrays
+        The relative errors after this stage.
     """
-    errors: dict[int, np.ndarray] = {}
-    for stage in strategy.stages:
-        stacked = add_equations([equations[name] for name in stage.points])
-        fixed = {joint: errors[joint] for joint in stage.fixed}
-        errors |= stacked.solve(sorted(stage.identified), fixed)
-    return np.stack([errors[joint] for joint in range(joints)])
+    stacked = add_equations([equations[name] for name in stage.points])
+    fixed = {joint: earlier[joint] for joint in stage.fixed}
+    return {**earlier, **stacked.solve(sorted(stage.identified), fixed)}
+
+
+def solve_strategies(
+    strategies: Sequence[Strategy], equations: Mapping[str, PrefixEquations]
+) -> list[dict[int, np.ndarray]]:
+    """Solve the stages of each strategy one after the other; strategies that begin with
+    the same stages share their solution.
+
+    Returns
+    -------
+    list of dicts of (configurations, sets) arrays
+        Relative errors of the compliances, by joint, of each strategy.
+    """
+    solved: dict[tuple[Stage, ...], dict[int, np.ndarray]] = {(): {}}
+    for strategy in strategies:
+        for number, stage in enumerate(strategy.stages):
+            before = strategy.stages[:number]
+            if (*before, stage) not in solved:
+                solved[*before, stage] = solve_stage(stage, equations, solved[before])
+    return [solved[strategy.stages] for strategy in strategies]
 
 
 @dataclass(frozen=True)
@@ -257,9 +284,10 @@ def _estimate_block(
     prefix is too short."""
     points = dict.fromkeys(name for strategy in estimators for name in strategy.points)
     equations = form_prefix_equations(study, sets, [*points])
+    solutions = solve_strategies(estimators, equations)
     errors_by_stages = {}
-    for estimator in estimators:
-        errors = estimate_errors(estimator, equations, study.robot.joints)
+    for estimator, by_joint in zip(estimators, solutions, strict=True):
+        errors = np.stack([by_joint[joint] for joint in range(study.robot.joints)])
         first = find_first_solvable_length(estimator, study.interpretation.rows)
         errors[:, : first - 1] = np.nan
         errors_by_stages[estimator.stages] = errors
