@@ -277,9 +277,9 @@ def _compare_designs(designs: pd.DataFrame, length: int) -> tuple[float, float, 
     ratios = []
     for _, cell in cells.groupby("robot"):
         rows = cell.set_index("design")[["rms_um", "rms_um_std_error"]]
-        ratios.append(
-            _divide(*(rows.loc[kind].to_numpy(float) for kind in ("random", "I")))
-        )
+        random = rows.loc["random"].to_numpy(float)
+        optimal = rows.loc["I"].to_numpy(float)
+        ratios.append(_divide(random, optimal))
     return min(ratios, default=_NO_INTERVAL)
 
 
