@@ -17,11 +17,19 @@ from durations import HUNG_S
 # Modules that the plug-ins and the rules import. elastocal is not one of them, because
 # each folder has its own copy.
 SHARED = (
+    "PIL.Image",
     "grimp",
     "jsonschema",
+    "nbformat.validator",
     "pandas",
     "pyarrow.parquet",
+    "scipy.optimize",
     "scipy.stats",
+    "smart_open",
+    "snakemake.benchmark",
+    "snakemake.profiles",
+    "snakemake.report.html_reporter",
+    "snakemake.storage",
     "snakemake_executor_plugin_slurm",
     "typst",
     "yaml",
