@@ -1,10 +1,12 @@
 """Commands as they are typed."""
 
 import shutil
+from functools import cache
 
 import numpy as np
 import pandas as pd
 import pytest
+import typer.testing
 from analysed_robots import analysed
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
@@ -15,6 +17,11 @@ from elastocal.errors import InputError
 
 # Angles from the middle of the limits to a posture that is not singular.
 BENT = np.array([0.0, 0.2, 0.1, 0.3, 0.7, 0.0])
+
+
+# Typer's runner builds all subcommands anew for each command, which takes longer than
+# many a command.
+typer.testing._get_command = cache(typer.testing._get_command)
 
 
 def run_command(*arguments):

@@ -7,6 +7,7 @@ import json
 import re
 import shutil
 import tempfile
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -36,16 +37,27 @@ _SEPARATOR_IN_VALUE = "\ue0a6"
 def load_template(name: str, filters: Mapping[str, Any] | None = None) -> Template:
     """Load a template of this package with additional filters, such as `words.FILTERS`;
     pages (.html) escape the facts that they show."""
-    from jinja2 import Environment, FunctionLoader, StrictUndefined
+    return _compile_template(name, _read_template(name), tuple((filters or {}).items()))
 
+
+# A command renders the same sentences several times, and compiling a template takes
+# longer than rendering it.
+@cache
+def _compile_template(
+    name: str, text: str, filters: tuple[tuple[str, Any], ...]
+) -> Template:
+    from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
+
+    # The loader is for the templates that this one imports.
     environment = Environment(
         loader=FunctionLoader(_read_template),
         autoescape=name.endswith(".html"),
         undefined=StrictUndefined,
         finalize=_protect_separators if name.endswith(".txt") else None,
     )
-    environment.filters |= filters or {}
-    return environment.get_template(name)
+    environment.filters |= dict(filters)
+    code = environment.compile(text, name)
+    return Template.from_code(environment, code, environment.make_globals(None))
 
 
 def _protect_separators(value: Any) -> Any:
