@@ -164,7 +164,8 @@ def test_plan_wants_as_many_poses_as_check_does(plan, elastocal, tmp_path):
 def test_a_plan_with_enough_numbers_has_no_remark(plan):
     options = ("--force", 200, "--pull", "--base-known", "--measured", "pose")
     targets = ("--target", "6DoF=0,0,0", "--target", "4DoF=0,0,0")
-    assert "poses are few" not in plan(*options, *targets, "--poses", "30")[0]
+    size = ("--poses", "30", "--candidates", "60")
+    assert "poses are few" not in plan(*options, *targets, *size)[0]
 
 
 @pytest.mark.parametrize("name", ["cell 7", "-cell", "größe", "a" * 81, "a<b"])

@@ -123,8 +123,9 @@ def test_the_command_has_every_subcommand_and_option_of_a_page():
         if text.startswith("elastocal ")
     ]
     assert len(entries) > 20
+    application = get_command(app)
     for arguments, line in entries:
-        command = get_command(app)
+        command = application
         while arguments and arguments[0] in getattr(command, "commands", {}):
             command = command.commands[arguments[0]]
             arguments = arguments[1:]
