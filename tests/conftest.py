@@ -51,8 +51,9 @@ def pytest_addoption(parser):
 
 
 def pytest_collection_modifyitems(config, items):
-    """Deselect slow tests unless they are asked for, and run the files that take minutes
-    first, so that no worker has one left at the end.
+    """Deselect slow tests unless they are asked for, and run the files that take longest
+    first, so that no worker has one left at the end: slow ones, then those that run the
+    workflow.
 
     The tests of a file stay together because they share fixtures: a twentieth of the
     slow tests is every twentieth slow file.
@@ -67,7 +68,13 @@ def pytest_collection_modifyitems(config, items):
         is_skipped = item.path not in chosen and item.get_closest_marker("slow")
         (deselected if is_skipped else kept).append(item)
     config.hook.pytest_deselected(items=deselected)
-    items[:] = sorted(kept, key=lambda item: item.path.parent.name != "workflow")
+    items[:] = sorted(
+        kept,
+        key=lambda item: (
+            item.path not in chosen,
+            item.path.parent.name != "workflow",
+        ),
+    )
 
 
 def pytest_collection_finish(session):
