@@ -60,7 +60,9 @@ def test_residuals_are_without_gross_errors_as_those_of_the_report(nominal, meas
     assert len(result.residuals["row"]) == len(campaign) - 1
 
 
-def test_report_is_written_and_its_facts_name_the_effect(result, tmp_path):
+def test_report_is_written_and_its_facts_name_the_effect(
+    result, tmp_path, blank_figures
+):
     result.report(tmp_path / "report.pdf")
     assert (tmp_path / "report.pdf").read_bytes().startswith(b"%PDF")
     assert "zero offset of joint 2" in result.facts["sentences"][0]
