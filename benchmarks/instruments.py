@@ -336,6 +336,13 @@ def main():
         everything += outcomes
         print(format_row(kind, outcomes), flush=True)
     print(format_row("all", everything))
+    for effect in TIMES:
+        named = [
+            outcome.named
+            for outcome in everything
+            if outcome.detected and outcome.effect == effect
+        ]
+        print(f"{effect}: named alone, of those detected: {format_rate(named)}")
 
 
 if __name__ == "__main__":
