@@ -101,12 +101,12 @@ def test_the_retained_signal_is_the_residual_of_a_fit_of_the_compliances(
     defect = Defect("lost_motion", (2,), 7e-5, 3)
     model = NoncentralityModel(fanuc_specimen, schedule)
     defective = apply_defects(fanuc_specimen, [defect])
-    change = model.project_change(defective)[0]
+    change = model.compute_change(defective)
     columns = []
     for joint in range(6):
         softer = fanuc_specimen.compliance * (1 + 0.01 * (np.arange(6) == joint))
         robot = replace(fanuc_specimen, compliance=softer)
-        columns.append(model.project_change(robot)[0])
+        columns.append(model.compute_change(robot))
     design = np.array(columns).T
     residual = change - design @ np.linalg.lstsq(design, change, rcond=None)[0]
     signal = model.compute_noncentralities(defective)
@@ -125,7 +125,7 @@ def test_a_shift_is_less_visible_to_a_tracker_that_stands_farther_away(
     robot = replace(weightless_specimen, tracker=tracker)
     model = NoncentralityModel(robot, schedule)
     moved = move_stand(robot, (1e-4, 0.0, 0.0), (0.0, 0.0, 0.0))
-    change = model.project_change(moved)[0]
+    change = model.compute_change(moved)
     change_of_x = change.reshape(-1, len(robot.arm.points), 6)[..., 0]
     distance = np.linalg.norm(model.poses[0] - np.array(tracker.stand_m), axis=-1)
     np.testing.assert_allclose(change_of_x, 10.0 / distance[schedule.training])

@@ -26,8 +26,8 @@ _Check = Callable[..., Iterator[Finding]]
 _SHA = "hashlib, SHA-256"
 _SAME_JOB = "the same job, run again"
 _METADATA = "its own metadata"
-# Checks of every file, whatever its contents, in terms of `Finding.by`. All other
-# checks compute something again.
+# Checks that apply to every file, in terms of `Finding.by`. All other checks compute
+# values again.
 OF_EVERY_FILE = ("its record", _SHA, _METADATA)
 # Checks that compute a file again, by the pattern of its name. Names in braces are
 # arguments of the check.
@@ -197,7 +197,7 @@ def check_remade(run: FinishedRun, file: str, digest: str) -> Finding:
 
 
 def check_provenance(run: FinishedRun, file: str) -> Iterator[Finding]:
-    """What a Parquet file of the pipeline says of its own settings, against its path,
+    """Compare the settings that a Parquet file of the pipeline states with its path,
     config.yaml and files of robots."""
     metadata = pq.ParquetFile(run.folder / file).metadata.metadata or {}
     if b"elastocal.provenance" not in metadata:
@@ -246,8 +246,8 @@ def check_provenance(run: FinishedRun, file: str) -> Iterator[Finding]:
 def _list_expected_settings(
     run: FinishedRun, file: str, stated: Mapping[str, str]
 ) -> dict[str, Any]:
-    """List the configured settings for the robot and strategy that a file states; those
-    of an interpretation the other way for the files of its studies."""
+    """List the configured settings for the robot and strategy that a file states; for
+    the studies of an alternative to an interpretation, the settings of the alternative."""
     alternatives = run.configuration["evaluation"]["alternatives"]
     is_alternative = file.startswith("results/alternatives/")
     number = file.split("/")[2] if is_alternative else ""

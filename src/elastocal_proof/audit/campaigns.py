@@ -116,7 +116,7 @@ def check_split(run: FinishedRun, file: str, campaign: str) -> Iterator[Finding]
     share no pose."""
     source = f"data/campaigns/{campaign}/measurements.parquet"
     facts = run.document(f"results/loop/{campaign}/campaign.json")
-    # The poses of a separate held-out campaign have numbers of their own.
+    # A separate held-out campaign numbers its poses independently.
     if facts.get("held_out") is not None or not run.has(source):
         return
     fitted = run.table(file)
@@ -157,8 +157,8 @@ def check_split(run: FinishedRun, file: str, campaign: str) -> Iterator[Finding]
 
 
 def check_seals(run: FinishedRun, file: str) -> Iterator[Finding]:
-    """Every ground truth of the blind benchmark is what was sealed, and every sealed one is
-    there."""
+    """Every ground truth of the blind benchmark has its sealed digest, and no sealed one is
+    missing."""
     digests = {
         path.name: hashlib.sha256(path.read_bytes()).hexdigest()
         for path in (run.folder / "data/sealed").glob("*/*.json")

@@ -70,7 +70,7 @@ class FinishedRun:
 
     def at(self, point: str) -> tuple[str, ...]:
         """Name the target on which the wrench acts (interpretation R6) when a point is
-        observed; none stands for the last one."""
+        observed; an empty tuple means the last target."""
         return () if self.wrench_at == "end_effector" else (point,)
 
     def pick(self, file: str, count: int) -> np.ndarray:

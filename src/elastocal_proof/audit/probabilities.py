@@ -231,7 +231,7 @@ class TracedEvidence:
     def _find_acting(
         self, model: Mapping[str, Any], probability: float
     ) -> tuple[str, ...]:
-        """Mechanisms of a model; the smooth error or the others are left out where they
+        """Mechanisms of a model without the smooth error, or without all others, if these
         are within the tolerance of laws."""
         names = {term["mechanism"] for term in self.list_terms(model)}
         laws = names - {_OTHER}
@@ -252,8 +252,9 @@ class TracedEvidence:
     def _split_squares(
         self, model: Mapping[str, Any], mechanisms: set[str]
     ) -> list[tuple[float, float]]:
-        """Whitened squares of the displacements by some mechanisms of a model, and by
-        its others: of each in all, and that which the other group cannot make."""
+        """Whitened squares of the displacements by some mechanisms of a model, and by its
+        other mechanisms: of each group in all, and of the part outside the span of the
+        other group."""
         terms = self.list_terms(model)
         columns, deviations = self._select_columns(terms, model["scales"])
         distance = np.abs(self._pose_errors - model["pose_error_rad"])

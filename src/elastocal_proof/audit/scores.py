@@ -1,4 +1,4 @@
-"""Audit of what the study makes of its estimates: bootstrap weights, scores, tables of
+"""Audit of the results that follow from estimates: bootstrap weights, scores, tables of
 the paper, and the errors of a campaign in its tables and verdict.
 
 Every value of these files is computed again, by pandas and numpy, from the files that
@@ -124,7 +124,7 @@ def check_metrics(
 def _check_spread(
     run: FinishedRun, frame: pd.DataFrame, robot: str, noise_um: str, strategy: str
 ) -> Iterator[Finding]:
-    """Shares of estimates that are not positive, their spread, and what is trusted."""
+    """Shares of estimates that are not positive, their spread, and trusted lengths."""
     estimates = _read_estimates(run, robot, noise_um, strategy)
     nonpositive = (estimates <= 0).any(axis=2).mean(axis=0)
     spread = (estimates.std(axis=0) / np.abs(estimates.mean(axis=0))).max(axis=1)

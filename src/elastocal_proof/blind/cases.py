@@ -67,8 +67,8 @@ REMAINS = "remains"
 # so far beyond the noise that a repeatable residual remains under any verdict.
 _TWO_ANGLE_EFFECTS = (OUTSIDE + "cable_pull", OUTSIDE + "two_angles")
 _REMAINING = 1e4
-# Mechanisms that occur at several joints at once, as a bad mastering or gears of one
-# make do.
+# Mechanisms that occur at several joints at once, as after a bad mastering or with gears
+# of one type.
 MULTI_JOINT_EFFECTS = (
     "bearing_runout",
     "hysteresis",
@@ -658,8 +658,8 @@ def _damage_rows(
 
 
 def _describe_defect(robot: SimulatedRobot, sized: SizedDefect) -> dict[str, Any]:
-    """Describe a defect as the ground truth does, with those of its parameters that the
-    catalogue has too."""
+    """Describe a defect for the ground truth, with its parameters that the catalogue has
+    too."""
     defect = sized.defect
     _, parameters = defect.on(robot)
     return (

@@ -38,6 +38,7 @@ from elastocal.application.verification import (
     compute_measured_errors,
 )
 from elastocal.campaigns.holdout import number_configurations
+from elastocal.campaigns.measurements import name_joint_columns
 from elastocal.campaigns.reading import read_robot
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import apply_regression, remove_gross_errors
@@ -430,7 +431,7 @@ def _measure_again(
     return {
         "part": wanted.part,
         "pose": np.arange(len(wanted.part)),
-        **{f"q{joint}": column for joint, column in enumerate(angles.T, 1)},
+        **name_joint_columns(angles),
         "reached_error_m": np.linalg.norm(position - wanted.position, axis=1),
         "measured_error_m": np.linalg.norm(measured[:, 0] - wanted.position, axis=1),
     }

@@ -1,8 +1,8 @@
 """Scores of the locations that a verdict states: the joints, or the links that begin at
 them, of the effects that it names.
 
-A name without its joint helps no mechanic. So each true effect that acts at joints is
-one row, whatever the verdict says of it.
+A repair needs the joint as well as the mechanism. So each true effect that acts at joints
+is one row, even if the verdict does not state it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ PARTLY = "partly"
 WRONG = "wrong"
 NOT_STATED = "not stated"
 SEVERAL_LOCATIONS = "several"
-# Columns of the confusion table that stand for no single joint.
+# Columns of the confusion table that are no single joint.
 _NO_JOINT = (SEVERAL_LOCATIONS, NOT_STATED)
 _COLUMNS = [
     "case",

@@ -110,7 +110,8 @@ def _iterate_targets(
 
 
 def _describe_planned_cases(plan: Plan, size: str, seed: int) -> pd.DataFrame:
-    """Describe the cases of a benchmark by what is known before they are made."""
+    """Describe the cases of a benchmark by their planned properties, without making
+    them."""
     rows = []
     for case in list_cases(plan, size, seed):
         rows.append(

@@ -1,8 +1,8 @@
-"""A simulated robot with hidden defects stands in for a real one: it fills a
-measurement sheet and moves as it is commanded.
+"""A simulated robot with hidden defects takes the place of a real one: it fills a
+measurement sheet and moves to its commands.
 
-With it a calibration is rehearsed, from the robot file to the corrected robot, before a
-tracker is hired.
+With it a calibration can be rehearsed, from the robot file to the corrected robot, before
+a tracker is hired.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from elastocal.errors import InputError
 from elastocal.exchange.target_path import read_target_path
 from elastocal.io.atomic_writes import check_places, write_atomically
 from elastocal.io.texts import read_text
-from elastocal.mechanics.components import WRENCH_NAMES
+from elastocal.mechanics.components import WRENCH_NAMES, list_joint_columns
 from elastocal.report.words import format_joints, join_items, name_effect
 from elastocal_proof.blind.cases import draw_misplaced_base
 from elastocal_proof.plant.arm import read_arm, to_rotation_vector
@@ -82,7 +82,7 @@ _MOMENT_ROUNDING = 1e-6
 def build_hidden_robot(
     robot_file: str | Path, seed: int, effects: Sequence[str] = ()
 ) -> tuple[SimulatedRobot, list[Defect]]:
-    """Build the robot that stands in for a real one.
+    """Build the simulated robot that takes the place of a real one.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def fill_sheet(
     source = path.as_posix()
     sheet = _read_table(path)
     targets = list(document["targets"])
-    angle_names = _name_angles(robot.arm.joints)
+    angle_names = list_joint_columns(robot.arm.joints)
     require_numbers(sheet, [*_STATE, *angle_names, *WRENCH_NAMES], source)
     if "target" not in sheet:
         raise InputError(source, "columns", "no 'target'", "the target of each row")
@@ -254,7 +254,7 @@ def measure_targets(
     check_places(output)
     table = _read_table(targets)
     source = targets.as_posix()
-    angle_names = _name_angles(robot.arm.joints)
+    angle_names = list_joint_columns(robot.arm.joints)
     require_numbers(table, [*angle_names, *WRENCH_NAMES], source)
     states = table[[*angle_names, *WRENCH_NAMES]].assign(
         pose=np.arange(1, len(table) + 1), load=0, repeat=0
@@ -327,7 +327,7 @@ def write_milling_path(
     )
     force = get_typical_force_N(robot.arm) / 2
     wrench = np.tile([0.0, 0.0, force, 0.0, 0.0, 0.0], (_PATH_POSES, 1))
-    angle_names = _name_angles(angles.shape[1])
+    angle_names = list_joint_columns(angles.shape[1])
     names = ["x", "y", "z", "rx", "ry", "rz", *WRENCH_NAMES, *angle_names]
     columns = [position, Rotation.from_matrix(rotation).as_rotvec(), wrench, angles]
     _write_table(path, pd.DataFrame(np.column_stack(columns), columns=names))
@@ -369,7 +369,7 @@ def measure_errors(
         wrench = np.zeros((len(wanted), 6))
     errors = {}
     for model, suffix in (("uncorrected", "_uncorrected"), ("corrected", "")):
-        columns = [f"{joint}{suffix}" for joint in _name_angles(robot.arm.joints)]
+        columns = [f"{joint}{suffix}" for joint in list_joint_columns(robot.arm.joints)]
         require_numbers(table, columns, source)
         angles = table[columns].to_numpy(float)
         position, rotation = move_robot(robot, angles, wrench, seed, source)
@@ -414,7 +414,7 @@ def move_robot(
         Positions, m, and rotations in the declared base frame.
     """
     count, joints = angles.shape
-    names = [*_name_angles(joints), *WRENCH_NAMES]
+    names = [*list_joint_columns(joints), *WRENCH_NAMES]
     states = pd.DataFrame(np.hstack([angles, wrench]), columns=names)
     states = states.assign(pose=np.arange(count), load=0, repeat=0)
     schedule = _build_schedule(robot.arm, states, seed, source)
@@ -478,11 +478,6 @@ def draw_milling_path(
     )
 
 
-def _name_angles(joints: int) -> list[str]:
-    """Name the columns of joint angles."""
-    return [f"q{joint}" for joint in range(1, joints + 1)]
-
-
 def require_numbers(table: pd.DataFrame, names: Sequence[str], source: str) -> None:
     """Refuse a table that lacks a column or has an entry that is no number, by an
     `InputError` that names `source` and the line."""
@@ -504,12 +499,12 @@ def _build_schedule(arm: Arm, states: pd.DataFrame, seed: int, source: str) -> S
     # Directions of approach that the table does not state are drawn.
     draws = open_simulation_stream(seed, "approaches")
     sense = draws.choice([-1, 1], (count, arm.joints))
-    approach_names = [f"approach{joint}" for joint in range(1, arm.joints + 1)]
+    approach_names = list_joint_columns(arm.joints, "approach")
     if set(approach_names) <= set(states):
         stated = states[approach_names].fillna(0).to_numpy(int)
         sense = np.where(stated == 0, sense, stated)
     return Schedule(
-        angle=states[_name_angles(arm.joints)].to_numpy(float),
+        angle=states[list_joint_columns(arm.joints)].to_numpy(float),
         force=force,
         lever=lever,
         **{name: states[name].to_numpy(int) for name in _STATE},

@@ -30,8 +30,8 @@ OTHER = "other"
 COMPLIANCE = "joint_compliance"
 # Effect by which a diagnosis says that the base is not where it is declared.
 _MISPLACED_BASE = "base_placement"
-# A scale of the forces is an alias of the compliances. Weights that are known to a tenth
-# leave next to nothing of it.
+# A scale of the forces is an alias of the compliances. With weights that are known to a
+# tenth, almost nothing of it is identifiable.
 _FORCE_SCALE = "force_scale"
 # Effects that lie within the span of another effect or of the joint compliances, by
 # effect and joints of the ground truth, with the mechanism from which they are
@@ -239,8 +239,8 @@ def _can_match(true_names: list[str], effects: list[Document]) -> bool:
 
 
 def _find_setup_mechanisms(truth: Document) -> set[str]:
-    """Find the mechanisms of the set-up that a case has beside its effects: it is right
-    to report them, and no error not to."""
+    """Find the mechanisms of the set-up that a case has in addition to its effects.
+    Reporting them is correct, and not reporting them is no error."""
     return {_MISPLACED_BASE} if "misplaced" in truth else set()
 
 
@@ -276,8 +276,8 @@ def _describe_size(truth: Document) -> dict[str, Any]:
 
 
 def _describe_errors(verdict: Document) -> dict[str, Any]:
-    """Describe the held-out errors, and whether an effect was adopted and they got
-    worse by more than chance."""
+    """Describe the held-out errors, and whether an effect was adopted although they grew
+    by more than chance."""
     heldout = verdict["heldout"]
     if not heldout:
         # A fault of the data ends a diagnosis before any model is fitted.
@@ -350,8 +350,8 @@ def is_true(
 ) -> bool:
     """Check whether a set of mechanisms is the true one of a case.
 
-    If the true mechanism is outside of the catalogue, or outside of what the case lets
-    anyone test (`hidden`), every set with "other" is true: no set can name it. A
+    If the true mechanism is not in the catalogue, or if the case does not allow to test it
+    (`hidden`), every set with "other" is true, because no set can name it. A
     mechanism that the joint compliances absorb at any size counts as nothing, because
     no measurement can distinguish the two.
     """

@@ -51,7 +51,7 @@ _COUNTED = [
 
 
 def select_targets(summary: pd.DataFrame) -> pd.DataFrame:
-    """Select the figures that have a target, of a summary as it is made or read."""
+    """Select the figures that have a target from a summary, computed or read."""
     return summary[summary.target.fillna("").ne("")]
 
 
@@ -162,7 +162,7 @@ def describe_setting(plan: Plan, setting: str) -> str:
 def _measure(
     figure: Figure, rows: pd.DataFrame, words: str, target: Target, seed: int
 ) -> Iterator[dict[str, Any]]:
-    """Compute a figure from its rows: a share, or what its ``measure`` says."""
+    """Compute a figure from its rows: a share, or its ``measure``."""
     measure = figure.get("measure")
     if measure is None:
         concerned = rows.query(figure["among"]) if "among" in figure else rows

@@ -1,5 +1,5 @@
-"""Tabulate the errors of all methods of the benchmark on poses that they have not seen,
-with intervals, and write them as a page of text."""
+"""Tabulate the errors of all methods of the benchmark at held-out poses, with intervals,
+and write them as a page of text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Read the arm of a robot file with a parser of its own, and say what its links weigh.
+"""Read the arm of a robot file with an independent parser, and estimate the weights of
+its links.
 
 The file's chain is a product of elementary transforms, ``Tz(l1) Rz(q1) Tx(l2) [2DoF]
 ...``. This module turns it into a list of rigid links with one drive between each pair

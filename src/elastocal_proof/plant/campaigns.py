@@ -1,5 +1,5 @@
-"""Campaigns of a simulated robot: what is done with it, the table of measurements, and
-rows that are wrong by a blunder."""
+"""Campaigns of a simulated robot: its schedule, the table of measurements, and rows that
+are wrong because of a blunder."""
 
 from __future__ import annotations
 
@@ -30,8 +30,7 @@ SECONDS_PER_STATE = 25.0
 # least the second number. Shorter arms have a proportionally shorter lever.
 _LEVER_M = (0.0, 0.5, 0.0)
 _LONG_REACH_M = 2.5
-# Errors of few rows, such as those of a lost beam, a slipped decimal point or a muddled
-# sheet.
+# Errors of few rows, such as a beam break, a slipped decimal point or a confused sheet.
 BLUNDER_KINDS = (
     "position",
     "rotation",
@@ -69,7 +68,7 @@ class Blunder(TypedDict):
 
 @dataclass(frozen=True)
 class Design:
-    """How a campaign is measured, and what is written down about it.
+    """How a campaign is measured, and which values its table has.
 
     Attributes
     ----------
@@ -256,7 +255,7 @@ def _draw_rows(
     if kind == "load":
         eligible = np.flatnonzero(table["load"])
     else:
-        # The first row has none before it whose point could be held.
+        # The first row has no row before it whose point it could repeat.
         eligible = np.arange(kind == "held_point", len(table["pose"]))
     shuffled = draws.permutation(eligible)
     first_of_pose = np.sort(np.unique(table["pose"][shuffled], return_index=True)[1])
@@ -327,7 +326,7 @@ def _change_angles(
             if lever_m > _MIN_LEVER_M:
                 break
         error = min(size * robot.tracker.sigma_m / lever_m, np.pi) * draw_sign(draws)
-        # Of these errors, which begin with the largest, the first feasible one counts.
+        # Take the first feasible one of these errors, which begin with the largest.
         errors = _FEASIBLE_SHARES * error
         angles = table[names[joint]][row] + errors
         low, high = arm.limits[joint]

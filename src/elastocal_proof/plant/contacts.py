@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 # Positions (k, 3), m, and rotations (k, 3, 3) of the tool at joint angles (k, n).
 Locate = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
-# Heights (k,) or one height, m, of a position (3,) over what is touched.
+# Heights (k,) or one height, m, of a position (3,) over the touched feature.
 Height = Callable[[np.ndarray], Any]
 # Step of numerical derivatives, rad, and largest step of Newton's method, rad.
 _STEP_RAD = 1e-6

@@ -1,4 +1,4 @@
-"""Apply defects to a simulated robot: those of the catalogue, and others.
+"""Apply defects to a simulated robot: defects of the catalogue, and others.
 
 The functions of defects have the names of the catalogue's effects. Each takes the robot,
 the size of the defect, random draws of its details, and joints that count from 0. It
@@ -143,8 +143,8 @@ def link_geometry(
 def link_weight(
     robot: SimulatedRobot, size: float, draws: Draws, *joints: int
 ) -> DefectiveRobot:
-    """An additional mass: of the upper arm or the forearm, beside its line; or of all
-    links in proportion to the declared ones. The joints that it loads say which."""
+    """An additional mass: of the upper arm or the forearm, off the link axis; or of all
+    links in proportion to the declared ones. The joints that it loads determine which."""
     loaded = tuple(joint + 1 for joint in joints)
     link = find_distinguishable_weights(robot.arm).get(loaded)
     if link is None:

@@ -25,7 +25,6 @@ from elastocal_proof.plant.multibody import MultibodyModel
 from elastocal_proof.plant.simulated_robot import (
     Schedule,
     SimulatedRobot,
-    open_simulation_stream,
     simulate_equilibrium,
     simulate_poses,
 )
@@ -93,33 +92,17 @@ class NoncentralityModel:
         self._absorbed = np.linalg.qr(np.vstack([design, priors]))[0]
         self._priors = len(weights)
 
-    def project_change(self, robot: SimulatedRobot) -> tuple[np.ndarray, np.ndarray]:
-        """Compute a robot's change in the training measurements and its residual.
-
-        Returns
-        -------
-        change : (M,) array
-            In standard deviations.
-        residual : (M + weights,) array
-            Part that the declared model cannot absorb; the last entries are the weights
-            that absorb the other part, in standard deviations of theirs.
-        """
+    def compute_change(self, robot: SimulatedRobot) -> np.ndarray:
+        """Compute a robot's change of the training measurements, in standard deviations,
+        (M,)."""
         poses = simulate_poses(robot, self.schedule, self._start)
-        change = self._compute_change(*poses)
-        return change, self._compute_residual(change)
-
-    def compute_measured_residual(self, robot: SimulatedRobot) -> np.ndarray:
-        """Compute the residual of a robot's measurements with the noise that they have
-        in its campaign."""
-        poses = simulate_poses(robot, self.schedule, self._start)
-        draws = open_simulation_stream(self.schedule.seed, "readings")
-        change = self._compute_change(*robot.tracker.read(*poses, draws))
-        return self._compute_residual(change)
+        return self._compare_poses(*poses)
 
     def compute_noncentralities(self, robot: SimulatedRobot) -> dict[str, float]:
         """Compute the non-centralities of a robot's change before and after absorption,
         ``raw`` and ``retained``."""
-        change, residual = self.project_change(robot)
+        change = self.compute_change(robot)
+        residual = self._compute_residual(change)
         return {"raw": float(change @ change), "retained": float(residual @ residual)}
 
     def _list_frame_motions(self) -> list[np.ndarray]:
@@ -133,7 +116,9 @@ class NoncentralityModel:
             motions += [self._whiten(shift), self._whiten(turn)]
         return motions
 
-    def _compute_change(self, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    def _compare_poses(self, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+        """Compare poses with those of the robot without a defect, in standard
+        deviations, (M,)."""
         turns = to_rotation_vector(rotation @ np.swapaxes(self.poses[1], -1, -2))
         return self._whiten(np.concatenate([position - self.poses[0], turns], axis=-1))
 
@@ -145,6 +130,9 @@ class NoncentralityModel:
         return whitened[self.schedule.training].ravel()
 
     def _compute_residual(self, change: np.ndarray) -> np.ndarray:
+        """Part of a change that the declared model cannot absorb, (M + weights,). The
+        last entries are the weights that absorb the other part, in their standard
+        deviations."""
         padded = np.append(change, np.zeros(self._priors))
         return padded - self._absorbed @ (self._absorbed.T @ padded)
 
