@@ -45,7 +45,7 @@ _GRID_COLUMNS = 18
 # Length of the arrow of a large residual, as a share of the workspace.
 _ARROW_SHARE = 0.13
 # The views of the workspace: the axes that are drawn to the right and upwards.
-_VIEWS = {"from the side": [0, 2], "from above": [0, 1]}
+VIEWS = {"from the side": [0, 2], "from above": [0, 1]}
 
 METRICS = {"mean": "mean", "rms": "RMS", "p95": "95th percentile", "max": "maximum"}
 # Colour and label of each kind of model.
@@ -154,38 +154,115 @@ def draw_residual_arrows(table: Columns, arm: np.ndarray | None = None) -> Figur
     arm : (K, 3) array, m
         Corners of the robot in one pose; drawn behind the arrows.
     """
+    residuals = _prepare_residuals(table)
+    extent = residuals.extent
+    height_mm = 26 + float(np.clip(66 * extent[1:].max() / extent[0], 40, 56))
+    figure, axes = create_panels(1, 2, height_mm)
+    for axis, view in zip(axes[0], VIEWS, strict=True):
+        _draw_view(axis, residuals, arm, view)
+    _draw_scale_arrow(axes[0, 1], residuals.scale)
+    explanation = "each arrow: mean of the repeats"
+    if residuals.cell_m is not None:
+        explanation = (
+            f"one state of each cell of {1e3 * residuals.cell_m:g} mm, that of the"
+            " middle residual"
+        )
+    figure.legend(
+        handles=_list_stage_handles(residuals),
+        title=explanation,
+        loc="outside lower center",
+        ncols=2,
+    )
+    return figure
+
+
+def draw_residual_view(
+    axis: Axes, table: Columns, arm: np.ndarray | None, view: str
+) -> None:
+    """Draw residuals as arrows in one view, with a legend.
+
+    Parameters
+    ----------
+    axis
+        Axes on which to draw.
+    table, arm
+        As of `draw_residual_arrows`.
+    view
+        A key of `VIEWS`.
+    """
+    residuals = _prepare_residuals(table)
+    _draw_view(axis, residuals, arm, view)
+    _draw_scale_arrow(axis, residuals.scale)
+    axis.legend(handles=_list_stage_handles(residuals), fontsize=7)
+
+
+@dataclass(frozen=True)
+class _Residuals:
+    """Residuals that are drawn.
+
+    Attributes
+    ----------
+    states
+        States with their positions and residuals.
+    extent : (3,) array
+        Extent of the positions, m.
+    scale
+        Scale of the arrows.
+    cell_m
+        Width of the cells of which one state is drawn, m; None if all are drawn.
+    """
+
+    states: _States
+    extent: np.ndarray
+    scale: _ArrowScale
+    cell_m: float | None
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """(S,) lengths of the residuals before, m."""
+        return np.linalg.norm(self.states.residuals["before"], axis=1)
+
+
+def _prepare_residuals(table: Columns) -> _Residuals:
+    """Average repeats, and choose the scale of the arrows and the cells."""
     states = _average_repeats(table)
     sizes = np.linalg.norm(states.residuals["before"], axis=1)
     largest_m = max(np.quantile(sizes, 0.95), 1e-9)
     extent = np.maximum(np.ptp(states.positions, axis=0), 1e-3)
     scale = _ArrowScale(largest_m, _ARROW_SHARE * extent.max())
     cell_m = None
-    explanation = "each arrow: mean of the repeats"
     if len(sizes) > _MAX_ARROWS:
         cell_m = _choose_cell_size(extent.max())
-        explanation = f"one state of each cell of {1e3 * cell_m:g} mm, that of the middle residual"
-    height_mm = 26 + float(np.clip(66 * extent[1:].max() / extent[0], 40, 56))
-    figure, axes = create_panels(1, 2, height_mm)
-    for axis, (title, view) in zip(axes[0], _VIEWS.items(), strict=True):
-        drawn = np.arange(len(sizes))
-        if cell_m is not None:
-            drawn = select_median_states(states.positions[:, view], sizes, cell_m)
-        _draw_arrows(axis, states, drawn, view, scale)
-        _draw_robot(axis, arm, view)
-        axis.set_title(title, loc="left")
-        axis.set(xlabel="x (m)", ylabel=f"{'xyz'[view[1]]} (m)", aspect="equal")
-        axis.margins(0.06)
-        axis.set_anchor("N")
-        axis.set_axisbelow(True)
-    _draw_scale_arrow(axes[0, 1], scale)
-    handles = [
+    return _Residuals(states, extent, scale, cell_m)
+
+
+def _draw_view(
+    axis: Axes, residuals: _Residuals, arm: np.ndarray | None, view: str
+) -> None:
+    """Draw arrows and arm in one view, a key of `VIEWS`."""
+    states = residuals.states
+    sizes = residuals.sizes
+    coordinates = VIEWS[view]
+    drawn = np.arange(len(sizes))
+    if residuals.cell_m is not None:
+        drawn = select_median_states(
+            states.positions[:, coordinates], sizes, residuals.cell_m
+        )
+    _draw_arrows(axis, states, drawn, coordinates, residuals.scale)
+    _draw_robot(axis, arm, coordinates)
+    axis.set_title(view, loc="left")
+    axis.set(xlabel="x (m)", ylabel=f"{'xyz'[coordinates[1]]} (m)", aspect="equal")
+    axis.margins(0.06)
+    axis.set_anchor("N")
+    axis.set_axisbelow(True)
+
+
+def _list_stage_handles(residuals: _Residuals) -> list[Line2D]:
+    """List the entries of a legend of the stages that are drawn."""
+    return [
         Line2D([], [], color=STAGES[stage][1], linewidth=2, label=STAGES[stage][0])
-        for stage in _list_stages(states)
+        for stage in _list_stages(residuals.states)
     ]
-    figure.legend(
-        handles=handles, title=explanation, loc="outside lower center", ncols=2
-    )
-    return figure
 
 
 def _average_repeats(table: Columns) -> _States:

@@ -5,12 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from elastocal.errors import InputError
 from elastocal.figures.loop import (
+    METRICS,
+    VIEWS,
     draw_before_after,
     draw_hypotheses,
     draw_model_errors,
     draw_probabilities,
     draw_residual_arrows,
+    draw_residual_view,
 )
 from elastocal.loop.schemas import find_worst_joint_angles
 from elastocal.mechanics.kinematics import locate_corners
@@ -44,6 +48,9 @@ class Plots:
         metric : str
             The error on given axes: "mean", "rms", "p95" or "max".
         """
+        if metric not in METRICS:
+            allowed = ", ".join(map(repr, METRICS))
+            raise InputError("errors", "metric", repr(metric), allowed)
         rows = self.result.judgement.rows
         noise_floor_m = self.result.verdict.heldout.noise_floor_rms_m
         if axes is None:
@@ -51,13 +58,29 @@ class Plots:
         draw_model_errors(axes, rows, metric, noise_floor_m)
         return _get_figure(axes)
 
-    def residuals(self) -> Figure:
-        """Draw the residuals before and after as arrows, from the side and from
-        above."""
+    def residuals(
+        self, axes: Axes | None = None, view: str = "from the side"
+    ) -> Figure:
+        """Draw the residuals before and after as arrows.
+
+        Parameters
+        ----------
+        axes : Axes, optional
+            On which one view is drawn; without them a figure of both views.
+        view : str
+            The view on given axes: "from the side" or "from above".
+        """
+        if view not in VIEWS:
+            allowed = " or ".join(map(repr, VIEWS))
+            raise InputError("residuals", "view", repr(view), allowed)
         robot = self.result.campaign.robot
         table = self.result.residuals
         angles = find_worst_joint_angles(table, robot.joints)
-        return draw_residual_arrows(table, locate_corners(robot.chain, angles))
+        arm = locate_corners(robot.chain, angles)
+        if axes is None:
+            return draw_residual_arrows(table, arm)
+        draw_residual_view(axes, table, arm, view)
+        return _get_figure(axes)
 
     def candidates(self, axes: Axes | None = None) -> Figure:
         """Draw how probable each hypothesis is; without given axes the Bayes factors of
