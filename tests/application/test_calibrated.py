@@ -12,7 +12,6 @@ from synthetic import NOISE, make_states
 from elastocal.application.calibrated import (
     calibrate_by_model,
     compute_pose_sensitivities,
-    factor_covariance,
     predict_poses,
 )
 from elastocal.fitting.model import apply_step
@@ -96,14 +95,3 @@ def test_sensitivities_are_the_derivatives_of_the_poses_by_every_parameter(fanuc
             rtol=1e-2,
             atol=1e-2 * np.abs(expected).max(),
         )
-
-
-def test_factor_of_a_covariance_does_not_depend_on_the_choice_of_eigenvectors():
-    """Equal eigenvalues, which rounding splits along any directions."""
-    deviation = np.array([1e-4, 5.0, 0.0, 2e-3])
-    covariance = np.diag(deviation**2)
-    rounding = np.random.default_rng(1).standard_normal((4, 4)) * 1e-15
-    disturbed = covariance + np.outer(deviation, deviation) * (rounding + rounding.T)
-    factor = factor_covariance(covariance)
-    np.testing.assert_allclose(factor @ factor.T, covariance, atol=1e-15)
-    np.testing.assert_allclose(factor_covariance(disturbed), factor, atol=1e-12)

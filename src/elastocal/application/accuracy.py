@@ -28,7 +28,6 @@ from scipy.special import gammainc, gammaincinv
 from elastocal.application.calibrated import (
     build_states,
     compute_pose_sensitivities,
-    factor_covariance,
     predict_poses,
     select_regression_inputs,
     split_into_chunks,
@@ -39,6 +38,7 @@ from elastocal.application.frames import (
     root_mean_square,
 )
 from elastocal.application.scope import set_form_error
+from elastocal.fitting.covariance import factor_covariance
 from elastocal.fitting.least_squares import IDENTIFIED_SHARE
 from elastocal.fitting.model import list_parameters
 from elastocal.mechanics.kinematics import compute_jacobians

@@ -16,11 +16,11 @@ from scipy.linalg import hadamard
 
 from elastocal.application.calibrated import (
     build_observations,
-    factor_covariance,
     move_to_end_effector,
     zero_coefficients,
 )
 from elastocal.application.frames import PLACEMENT_PARAMETERS, compute_placement_columns
+from elastocal.fitting.covariance import factor_covariance
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import (
     compute_displaced_coordinates,

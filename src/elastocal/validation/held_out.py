@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import stdtrit
 
+from elastocal.fitting.covariance import factor_covariance
 from elastocal.fitting.least_squares import (
     INTERMEDIATE_TOLERANCE,
     fit_model,
@@ -425,8 +426,7 @@ def predict_left_out_residuals(
     -------
     (M, rows) array, measured minus predicted, m and rad, base axes
     """
-    variance, axes = np.linalg.eigh(fitted.covariance)
-    covariance_root = axes * np.sqrt(np.maximum(variance, 0.0))
+    covariance_root = factor_covariance(fitted.covariance)
     gram, gradient, blocks = _sum_by_group(fitted, observations, group, covariance_root)
     changes = map(_solve_without, gram, gradient)
     steps = np.array([covariance_root @ change for change in changes])
