@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -140,6 +141,12 @@ def test_robot_path_and_verification_are_shown_in_a_line(result, nominal, comman
         assert str(shown).startswith(start)
         assert "\n" not in str(shown)
     assert "measured 0.000 mm; the prediction held" in str(verified)
+
+
+def test_a_robot_without_a_bound_is_shown_without_one(result):
+    accuracy = replace(result.robot.verdict.accuracy, rms_bound_m=None)
+    verdict = replace(result.robot.verdict, accuracy=accuracy)
+    assert str(replace(result.robot, verdict=verdict)).endswith(" mm RMS>")
 
 
 def test_a_folder_that_is_missing_is_named_with_the_file(result, tmp_path):

@@ -92,9 +92,9 @@ class CorrectedRobot:
         text = f"<CorrectedRobot {self.nominal.name}: {effects or 'no effect'}"
         accuracy = self.verdict.accuracy
         if accuracy is not None:
-            predicted = format_millimetres(accuracy.rms_m)
-            bound = format_millimetres(accuracy.rms_bound_m)
-            text += f"; predicted error {predicted} RMS, 95 % bound {bound}"
+            text += f"; predicted error {format_millimetres(accuracy.rms_m)} RMS"
+            if accuracy.rms_bound_m is not None:
+                text += f", 95 % bound {format_millimetres(accuracy.rms_bound_m)}"
         return f"{text}>"
 
     @property
