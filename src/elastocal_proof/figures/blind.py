@@ -65,6 +65,8 @@ _NO_CASE: dict[str, Any] = {
 }
 # Name of all effects, groups or robots together.
 _ALL = "all"
+# More names of robots beside each other do not fit into the width of a page.
+_LEGEND_COLUMNS = 2
 _MODELS = {
     "uncorrected": "uncorrected",
     "geometry": "geometry alone",
@@ -322,7 +324,7 @@ def draw_correction_errors(table: pd.DataFrame, names: Mapping[str, str]) -> Fig
         title="without the tracker's noise; bars are 95 % intervals",
         title_fontsize=7.5,
         loc="outside lower center",
-        ncols=max(len(robots), 1),
+        ncols=_LEGEND_COLUMNS,
     )
     return figure
 
