@@ -7,7 +7,7 @@ import pytest
 from elastocal.command import main
 from elastocal.errors import InputError
 
-WITHOUT_SUBCOMMAND = {"diagnosis_runs", "__init__", "main", "terminal"}
+WITHOUT_SUBCOMMAND = {"diagnosis_runs", "__init__", "main", "plan_places", "terminal"}
 
 
 @pytest.mark.parametrize(
