@@ -160,13 +160,7 @@ class Campaign:
         check_instance(_SOURCE, "robot", robot, Robot, ROBOT_ALLOWED)
         check_instance(_SOURCE, "table", table, pd.DataFrame, "a DataFrame of pandas")
         angles = list_joint_columns(robot.commands)
-        needed = [*angles, *"xyz"]
-        if any(name in table for name in ROTATION):
-            needed += ROTATION
-        missing = [name for name in needed if name not in table]
-        if missing:
-            allowed = f"a table with {', '.join(needed)}"
-            raise InputError(_SOURCE, "table", f"no column {missing[0]!r}", allowed)
+        _refuse_missing_columns(table, angles)
         if any(name in table for name in WRENCH_NAMES):
             absent = [name for name in WRENCH_NAMES if name not in table]
             table = table.assign(**dict.fromkeys(absent, 0.0))
@@ -211,6 +205,18 @@ class Campaign:
             f"<Campaign {self.checked.name} of {self.robot.name}: {len(self)}"
             f" measurements of {len(self.checked.targets)} target(s) at {poses} poses>"
         )
+
+
+def _refuse_missing_columns(table: pd.DataFrame, angles: list[str]) -> None:
+    """Refuse a table without the columns of joint angles and positions, or with a part
+    of the rotation."""
+    needed = [*angles, *"xyz"]
+    if any(name in table for name in ROTATION):
+        needed += ROTATION
+    missing = [name for name in needed if name not in table]
+    if missing:
+        allowed = f"a table with {', '.join(needed)}"
+        raise InputError(_SOURCE, "table", f"no column {missing[0]!r}", allowed)
 
 
 def read_campaign(
