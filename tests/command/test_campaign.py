@@ -96,6 +96,12 @@ def test_a_check_says_what_was_read_identified_and_testable(elastocal, tmp_path)
     assert details[-1] == f"next: elastocal diagnose {folder}"
 
 
+def test_a_check_refuses_the_name_of_a_campaign_of_the_project(refusal, tmp_path):
+    """`diagnose` would refuse it."""
+    folder = make_folder(tmp_path / "cell", analysed("kuka"), name="ur5_grid")
+    assert "'ur5_grid', a campaign of elastocal" in refusal("check", folder)
+
+
 def test_faults_of_the_data_end_in_exit_code_one(elastocal, tmp_path):
     robot = analysed("kuka")
     table = make_table(robot, "made")

@@ -74,7 +74,7 @@ def init(
 
     check_places(*(folder / name for name in (_ROBOT, DOCUMENT, CSV, PARQUET)))
     _check_new_campaign(folder / DOCUMENT, folder / _ROBOT, robot)
-    refuse_taken_name(folder)
+    refuse_taken_name(folder.resolve().name, folder)
     arm = read_robot(robot or folder / _ROBOT)
     targets, measured = read_measured_targets(folder)
     files = {}
@@ -121,11 +121,16 @@ def check(folder: Annotated[Path, Argument(help="Folder of the campaign.")]) -> 
     """
     from rich.console import Console
 
-    from elastocal.campaigns.campaign_folder import check_workflow_path
+    from elastocal.campaigns.campaign_folder import (
+        check_workflow_path,
+        read_campaign_folder,
+    )
     from elastocal.loop.overview import inspect_campaign
 
-    # The next command is `diagnose`, which refuses such a path.
+    # The next command is `diagnose`, which refuses such a path and such a name.
     check_workflow_path(str(folder.resolve()))
+    on_disk = read_campaign_folder(folder, find_robots_folder())
+    refuse_taken_name(on_disk.name, on_disk.source)
     report = inspect_campaign(folder, find_robots_folder())
     next_step = "mend the data, then check again"
     if report.diagnosable:

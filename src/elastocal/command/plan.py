@@ -285,7 +285,7 @@ def _check_new_folder(folder: Path) -> None:
     from elastocal.io.texts import describe_file_kind
 
     check_campaign_name(folder.resolve())
-    refuse_taken_name(folder)
+    refuse_taken_name(folder.resolve().name, folder)
     if os.path.lexists(folder):
         kind = describe_file_kind(os.lstat(folder).st_mode)
         raise InputError(folder, "", f"{kind} that is there", "a new one")

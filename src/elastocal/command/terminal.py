@@ -270,15 +270,16 @@ def _find_checkout() -> Path | None:
     return None
 
 
-def refuse_taken_name(folder: Path) -> None:
-    """Refuse a folder whose name is that of a campaign of this project, which `diagnose`
-    would refuse after all has been measured: an InputError."""
+def refuse_taken_name(name: str, source: str | Path) -> None:
+    """Refuse the name of a campaign, read from `source` or to be written there, that is
+    that of a campaign of this project. `diagnose` would refuse it after all has been
+    measured: an InputError."""
     from elastocal.campaigns.importers import refuse_project_name
     from elastocal.io.documents import read_document
 
     path = find_pipeline() / "config.yaml"
     if path.is_file():
-        refuse_project_name(folder.resolve().name, read_document(path), folder)
+        refuse_project_name(name, read_document(path), source)
 
 
 def load_diagnosed_campaign(folder: Path) -> DiagnosedCampaign:
