@@ -65,6 +65,9 @@ _NO_CASE: dict[str, Any] = {
 }
 # Name of all effects, groups or robots together.
 _ALL = "all"
+# Height of a figure without robots, and of the marks of one robot, mm.
+_AXIS_HEIGHT = 20.0
+_ROBOT_HEIGHT = 14.0
 # More names of robots beside each other do not fit into the width of a page.
 _LEGEND_COLUMNS = 2
 _MODELS = {
@@ -296,7 +299,8 @@ def draw_correction_errors(table: pd.DataFrame, names: Mapping[str, str]) -> Fig
     """
     robots = [robot for robot in dict.fromkeys(table["robot"]) if robot != _ALL]
     heights = np.arange(len(_MODELS))[::-1]
-    figure, axes = create_panels(1, len(_PARTS), 62, sharey=True, sharex=True)
+    height = _AXIS_HEIGHT + _ROBOT_HEIGHT * len(robots)
+    figure, axes = create_panels(1, len(_PARTS), height, sharey=True, sharex=True)
     for axis, (test, title) in zip(axes[0], _PARTS.items(), strict=True):
         for number, robot in enumerate(robots):
             chosen = (table["part"] == test) & (table["robot"] == robot)
