@@ -257,6 +257,12 @@ def test_files_and_arrays_are_verified_alike(result, measured_targets, tmp_path)
     pd.testing.assert_frame_equal(by_file.table, by_array.table)
 
 
+def test_positions_in_millimetres_are_refused(result, measured_targets):
+    path, position = measured_targets
+    with pytest.raises(ec.InputError, match="in metres"):
+        result.robot.verify(path, 1e3 * position)
+
+
 def test_targets_that_were_not_measured_are_left_out(result, measured_targets):
     path, position = measured_targets
     partly = position.copy()

@@ -295,12 +295,17 @@ def _refuse_other_angles(
     cells.refuse(wrong, names, "the joint angle of this target, as corrected")
 
 
-def _refuse_millimetres(cells: Cells, position: np.ndarray, wanted: np.ndarray) -> None:
-    """Refuse positions (M, 3) that spread so much farther than the wanted ones that they
-    are not in metres."""
+def are_millimetres(position: np.ndarray, wanted: np.ndarray) -> bool:
+    """Whether positions (M, 3) spread so much farther than the wanted ones (M, 3), m, that
+    they are not in metres."""
     spread = np.ptp(position, axis=0).max()
     allowed_spread = _LARGEST_SPREAD * (np.ptp(wanted, axis=0).max() + _REFLECTOR_M)
-    if spread > allowed_spread:
+    return bool(spread > allowed_spread)
+
+
+def _refuse_millimetres(cells: Cells, position: np.ndarray, wanted: np.ndarray) -> None:
+    """Refuse positions (M, 3) that are not in metres."""
+    if are_millimetres(position, wanted):
         distance = np.abs(position - np.median(position, axis=0))
         allowed = (
             "metres; --lengths mm, or a header such as 'x [mm]', states another unit"

@@ -32,6 +32,7 @@ from elastocal.exchange.makers_kinematics import (
     read_makers_file,
 )
 from elastocal.exchange.measured_targets import (
+    are_millimetres,
     arrange_corrected_targets,
     arrange_positions,
     read_corrected_targets,
@@ -247,6 +248,10 @@ class CorrectedRobot:
             measurements = arrange_positions(corrected, position, reflectors[0])
         if not len(measurements):
             raise InputError("verify", "measured", "no position", "measured targets")
+        wanted = corrected.position[measurements.row]
+        if are_millimetres(measurements.position, wanted):
+            finding = "positions that spread much farther than the targets"
+            raise InputError("verify", "measured", finding, "positions in metres")
         return verify_robot(
             self.calibrated, corrected, measurements, tolerance_m, accepted_risk
         )
