@@ -179,7 +179,7 @@ def draw_reliability(reliability: pd.DataFrame) -> Figure:
         linewidth=1.2,
         label="verdicts, with 95 % intervals",
     )
-    shares.legend(loc="upper left")
+    shares.legend(loc="lower right")
     width = rows["to"] - rows["from"]
     counts.bar(
         rows["from"] + 0.1 * width, rows.cases, 0.8 * width, align="edge", color=_COLOR
