@@ -227,6 +227,26 @@ class _CrossValidatedModel:
         return with_residual / repetitions, np.full(count, mean_square)
 
 
+class _LeftOutFold(NamedTuple):
+    """A fold, along the D principal axes of the Gram matrix of all other folds.
+
+    Attributes
+    ----------
+    eigenvalues : (D,) array, of this Gram matrix
+    mean : mean of the eigenvalues
+    axes : (D, D) array, principal axes
+    training, left_out : (1 + N, D) arrays
+        Products of the basis in the other folds, and in this one, with the residuals of
+        the data and of the simulated data sets.
+    """
+
+    eigenvalues: np.ndarray
+    mean: float
+    axes: np.ndarray
+    training: np.ndarray
+    left_out: np.ndarray
+
+
 def _fit_models(
     fitted: Fit,
     observations: Observations,
@@ -379,26 +399,6 @@ def _cross_validate(
         scores = with_residual / np.sqrt(square)
         by_fold = np.reshape(coefficients, (len(partitions), _FOLDS, -1))
         yield _CrossValidatedModel(products, scores, partitions, by_fold)
-
-
-class _LeftOutFold(NamedTuple):
-    """A fold, along the D principal axes of the Gram matrix of all other folds.
-
-    Attributes
-    ----------
-    eigenvalues : (D,) array, of this Gram matrix
-    mean : mean of the eigenvalues
-    axes : (D, D) array, principal axes
-    training, left_out : (1 + N, D) arrays
-        Products of the basis in the other folds, and in this one, with the residuals of
-        the data and of the simulated data sets.
-    """
-
-    eigenvalues: np.ndarray
-    mean: float
-    axes: np.ndarray
-    training: np.ndarray
-    left_out: np.ndarray
 
 
 def _rotate_to_principal_axes(
