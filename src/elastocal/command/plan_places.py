@@ -54,13 +54,13 @@ def read_kind(measured: str) -> Kind:
         if name in TRACKED or kind.place_keys
     }
     if measured not in kinds or kinds[measured].sensor is None:
-        found = (
+        finding = (
             f"{measured!r}, which has no plans"
             if measured in list_kinds()
             else (repr(measured))
         )
         allowed = suggest_names(measured, list(kinds))
-        raise InputError("--measured", "", found, allowed)
+        raise InputError("--measured", "", finding, allowed)
     return kinds[measured]
 
 
@@ -98,8 +98,8 @@ def read_setup(
     if not places or (kind.reads_poses and len(places) > 1):
         keys = ",".join(kind.place_keys)
         count = "one" if kind.reads_poses else "one for each feature, at least one"
-        found = f"{len(places)} places" if places else "no place"
-        raise InputError("--place", "", found, f"NAME={keys}: {count}")
+        finding = f"{len(places)} places" if places else "no place"
+        raise InputError("--place", "", finding, f"NAME={keys}: {count}")
     if len(targets) != 1:
         allowed = f"one, because {kind.name} measures one"
         raise InputError("--target", "", f"{len(targets)} targets", allowed)
