@@ -736,13 +736,19 @@ def _add_effects(
         find_oversized_effects(full_model, evidence.conclusion.best.named),
     )
     models = (declared, full_model)
-    refusal = _refuse_adoption(subset, evidence, models, context.settings)
+    refusal, kept_in_sample = _refuse_adoption(
+        subset, evidence, models, context.settings
+    )
     evidence = replace(
         evidence,
         conclusion=conclusion,
         adopted=evidence.expected_to_help and not refusal,
     )
-    compared = _list_compared(evidence, models, observations, context.settings)
+    if subset.search_sample is not observations:
+        kept_in_sample = None
+    compared = _list_compared(
+        evidence, models, observations, kept_in_sample, context.settings
+    )
     losses = adoption.describe_losses(frames, compared, observations, context.settings)
     evidence = replace(evidence, adopted=evidence.adopted and not losses)
     steps = [result.steps[0], Step("declared model", "declared", compared[0])]
@@ -775,19 +781,21 @@ def _list_compared(
     evidence: Evidence,
     models: tuple[Fit, Fit],
     observations: Observations,
+    kept: Fit | None,
     settings: Settings,
 ) -> list[Fit]:
     """List the models to compare with frames alone: the declared one, and the one with
     the effects found if these are adopted.
 
-    `models`: without and with the effects.
+    `models`: without and with the effects. `kept`: result of `_fit_kept` for the same
+    observations, if it is known.
     """
     declared, full_model = models
     if evidence.adopted:
         return [declared, full_model]
     if evidence.conclusion.verdict in (verdict.ADEQUATE, verdict.NOT_TESTABLE):
         return [full_model]
-    return [_fit_kept(evidence, declared, observations, settings)]
+    return [kept or _fit_kept(evidence, declared, observations, settings)]
 
 
 def _refuse_adoption(
@@ -795,16 +803,16 @@ def _refuse_adoption(
     evidence: Evidence,
     models: tuple[Fit, Fit],
     settings: Settings,
-) -> list[str]:
+) -> tuple[list[str], Fit | None]:
     """Say why the effects found do not enter the model; nothing if they do, or if there
-    are none.
+    are none. The fit to the search sample with which they are compared comes second.
 
     `models`: without and with the effects, fitted to all observations.
     """
     if not evidence.conclusion.best.named:
-        return []
+        return [], None
     if not evidence.expected_to_help:
-        return [adoption.TOO_UNCERTAIN]
+        return [adoption.TOO_UNCERTAIN], None
     sample = subset.search_sample
     declared, full_model = models
     if sample is not subset.case.observations:
@@ -816,9 +824,10 @@ def _refuse_adoption(
     predicted = model_averaging.predict_gain(
         evidence.design.problem, evidence.posterior, evidence.named_model
     )
-    return adoption.describe_missing_gain(
+    refusal = adoption.describe_missing_gain(
         (kept, full_model), sample, predicted, settings
     )
+    return refusal, kept
 
 
 def _fit_kept(

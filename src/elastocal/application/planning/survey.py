@@ -36,6 +36,7 @@ from elastocal.fitting.model import (
     list_parameters,
 )
 from elastocal.fitting.noise import Noise
+from elastocal.fitting.normal_equations import compute_whitening
 from elastocal.fitting.observations import Observations, States
 from elastocal.fitting.sensor_noise import ShapedNoise, compute_sensor_roots
 from elastocal.measuring.catalogue import list_kinds
@@ -255,13 +256,8 @@ def compute_information_rows(
         around = evaluate_conditions(model, estimate, observations.states)
         linearization = linearize(model, estimate, observations, around)
         roots = compute_sensor_roots(model, estimate, observations, noise)
-        if roots is None:
-            whitened = (
-                linearization.sensitivities / noise.sensor_std(survey.rows)[:, None]
-            )
-        else:
-            whitened = np.linalg.solve(roots, linearization.sensitivities)
-        scaled = whitened * plausible
+        whitening = compute_whitening(observations, None, noise, roots)
+        scaled = whitening.apply(linearization.sensitivities) * plausible
         rows[chunk] = scaled.reshape(-1, survey.numbers, len(plausible))
     return rows
 
