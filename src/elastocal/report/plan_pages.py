@@ -46,16 +46,9 @@ def collect_plan_facts(
         Names and counts, the heads of the table, and for each pose its cells and the
         number of measurements under each load.
     """
-    angle_columns = [
-        name
-        for name in map(str, rows)
-        if name.startswith("q") and name.rpartition("_")[2] in DISPLAY_UNITS
-    ]
+    angle_columns = _list_angle_columns(rows)
     force_columns = ["fx", "fy", "fz"] if survey.loaded and survey.pulled else []
-    heads = ["pose"]
-    for name in angle_columns:
-        joint, _, unit = name.partition("_")
-        heads.append(f"{joint} ({_UNITS[unit]})")
+    heads = ["pose", *map(_name_angle, angle_columns)]
     heads += [f"F{name[1]} (N)" for name in force_columns]
     # People hang masses, not forces.
     hanging = [_format_hanging_mass(survey)] if survey.hanging else []
@@ -85,6 +78,22 @@ def collect_plan_facts(
         "fitted": fitted,
         "worth": " ".join(worth),
     }
+
+
+def _list_angle_columns(rows: pd.DataFrame) -> list[str]:
+    """List the columns with joint angles as the controller shows them, such as
+    q1_deg."""
+    return [
+        name
+        for name in map(str, rows)
+        if name.startswith("q") and name.rpartition("_")[2] in DISPLAY_UNITS
+    ]
+
+
+def _name_angle(column: str) -> str:
+    """Name a joint angle in the head of a table with its unit."""
+    joint, _, unit = column.partition("_")
+    return f"{joint} ({_UNITS[unit]})"
 
 
 def _format_pose(

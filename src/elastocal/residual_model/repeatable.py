@@ -262,19 +262,10 @@ def _fit_models(
     )
     inputs = build_geometric_inputs(fitted.model, fitted.estimate, observations)
     size = int(np.clip(count, _MIN_FUNCTIONS, _MAX_FUNCTIONS))
-    products = []
-    for basis in _choose_bases(inputs, size, stream):
-        functions = basis(inputs.select(slice(1))).shape[2]
-        products.append(
-            _BasisProducts(
-                basis,
-                configuration,
-                group,
-                np.zeros((count, functions)),
-                np.zeros((_GROUPS, functions, functions)),
-                np.zeros((_GROUPS, functions, parameters)),
-            )
-        )
+    products = [
+        _start_products(basis, inputs, configuration, group, parameters)
+        for basis in _choose_bases(inputs, size, stream)
+    ]
     white_residual = fitted.whiten(fitted.residual)
     weight = np.sqrt(fitted.weights)[:, None, None]
     gradient = np.zeros((count, parameters))
@@ -305,6 +296,29 @@ def _fit_models(
         for basis_products in products
         for model in _cross_validate(basis_products, chance, partitions)
     ]
+
+
+def _start_products(
+    basis: Basis,
+    inputs: Inputs,
+    configuration: np.ndarray,
+    group: np.ndarray,
+    parameters: int,
+) -> _BasisProducts:
+    """Start the products of a basis at zero.
+
+    `configuration` (M,) and `group` (G,) as in `_BasisProducts`; `parameters`: number
+    of parameters of the fit.
+    """
+    functions = basis(inputs.select(slice(1))).shape[2]
+    return _BasisProducts(
+        basis,
+        configuration,
+        group,
+        np.zeros((len(group), functions)),
+        np.zeros((_GROUPS, functions, functions)),
+        np.zeros((_GROUPS, functions, parameters)),
+    )
 
 
 def _compute_leverage(sensitivities: np.ndarray, covariance: np.ndarray) -> np.ndarray:

@@ -16,6 +16,7 @@ from elastocal.mechanics.components import WRENCH_NAMES
 if TYPE_CHECKING:
     from elastocal.application.planning.plan import Plan
     from elastocal.application.planning.survey import Survey
+    from elastocal.measuring.protocol import Kind
 
 # Number of poses that are repeated, and how often each is measured. The noise is
 # estimated from the repeats, some sixty contrasts of positions, instead of declared.
@@ -42,36 +43,58 @@ def build_sheet(survey: Survey, plan: Plan) -> pd.DataFrame:
         [plan.fitted.joint_angles, plan.held_out.joint_angles]
     )
     forces = np.concatenate([plan.fitted.force, plan.held_out.force])
-    repeated = min(REPEATED_POSES, len(plan.fitted.joint_angles))
     kind = list_kinds()[survey.measured]
-    if kind.is_contact:
-        repeated = 0
+    repeated = _count_repeated(kind, plan)
     features = _name_features(survey, plan)
     for pose, (angles, force) in enumerate(zip(joint_angles, forces, strict=True), 1):
-        joint_cells = _format_joints(survey, angles)
         feature_cells = {"feature": features[pose - 1]} if features else {}
-        for repeat in range(REPEATS if pose <= repeated else 1):
-            shares = survey.shares[:2] if repeat else survey.shares
-            for load, share in enumerate(shares):
-                wrench_cells = {}
-                if survey.setup is None:
-                    wrench_cells = _format_wrench(share, force)
-                for target in survey.targets:
-                    rows.append(
-                        {
-                            "pose": pose,
-                            "load": load,
-                            "repeat": repeat,
-                            "target": target.name,
-                            **feature_cells,
-                            TICK_COLUMN: "",
-                            **joint_cells,
-                            **wrench_cells,
-                        }
-                    )
+        cells = {**feature_cells, TICK_COLUMN: "", **_format_joints(survey, angles)}
+        repeats = REPEATS if pose <= repeated else 1
+        of_pose = _build_rows_of_pose(survey, cells, force, repeats)
+        rows += [{"pose": pose, **row} for row in of_pose]
     # A row of a contact has no numbers but the joint angles.
     empty = () if kind.is_contact else kind.columns
     return pd.DataFrame(rows).assign(**dict.fromkeys(empty, np.nan))
+
+
+def _build_rows_of_pose(
+    survey: Survey, cells: dict[str, Any], force: np.ndarray, repeats: int
+) -> list[dict[str, Any]]:
+    """Build the rows of all repeats, loads and targets of a pose.
+
+    Parameters
+    ----------
+    survey : what is measured.
+    cells : cells that all rows of the pose have.
+    force : (3,) full load, N, base axes.
+    repeats : number of approaches. All but the first have at most one load.
+    """
+    rows = []
+    for repeat in range(repeats):
+        shares = survey.shares[:2] if repeat else survey.shares
+        for load, share in enumerate(shares):
+            wrench_cells = {}
+            if survey.setup is None:
+                wrench_cells = _format_wrench(share, force)
+            rows += [
+                {
+                    "load": load,
+                    "repeat": repeat,
+                    "target": target.name,
+                    **cells,
+                    **wrench_cells,
+                }
+                for target in survey.targets
+            ]
+    return rows
+
+
+def _count_repeated(kind: Kind, plan: Plan) -> int:
+    """Count the poses that are repeated. A contact is not, because each has joint angles
+    of its own."""
+    if kind.is_contact:
+        return 0
+    return min(REPEATED_POSES, len(plan.fitted.joint_angles))
 
 
 def _name_features(survey: Survey, plan: Plan) -> list[str]:
