@@ -106,7 +106,7 @@ def test_the_first_screen_has_the_claim_a_picture_the_figures_and_the_two_ways_i
         "Calibration of robot arms in Python",
         "before | after | noise floor",
         "false alarms",
-        "mechanism right",
+        "true mechanism",
         "KUKA",
         "UR5",
     ):
