@@ -78,7 +78,7 @@ def test_the_registered_size_has_the_robots_null_cases_and_settings_of_the_proto
 ):
     assert {case.robots for case in registered} == {PROOF}
     robots = {case.robot for case in registered}
-    assert robots == {"sia20d", "sawyer", "irb4600", "m900ia260l"}
+    assert robots == {"xarm7", "rizon10", "kr120", "rx160"}
     assert len(registered) <= 2000
     assert sum(case.group == "none" for case in registered) == 320
     for setting, changes in SETTINGS.items():

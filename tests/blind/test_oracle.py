@@ -1,7 +1,6 @@
 """The oracle knows the effect and its joints and is judged like the diagnosis."""
 
 import json
-from types import SimpleNamespace
 
 import pytest
 from analysed_robots import ROBOTS
@@ -42,8 +41,7 @@ def test_a_variant_consists_of_the_candidates_at_the_true_joints(list_keys):
 def run_without_terms(monkeypatch, truth, verdict, folder):
     """Run the oracle as if the measurements could test nothing at all."""
     with monkeypatch.context() as patch:
-        nothing = SimpleNamespace(terms=())
-        patch.setattr(oracle, "build_candidate_design", lambda *arguments: nothing)
+        patch.setattr(oracle, "score_candidates", lambda *arguments: {})
         return fit_oracle(truth, verdict, folder, ROBOTS.as_posix(), 1)
 
 
@@ -69,11 +67,14 @@ def test_the_oracle_fits_what_the_diagnosis_names_rightly(tmp_path, monkeypatch)
     oracle_of_untestable = run_without_terms(monkeypatch, truth, verdict, folder)
     assert oracle_of_untestable["candidates"] == []
     assert oracle_of_untestable["p_value"] == 1.0
+    assert oracle_of_untestable["rivals"] is None
     informed = fit_oracle(truth, verdict, folder, ROBOTS.as_posix(), 1)
     [joint] = truth["defects"][0]["joints"]
     assert informed["candidates"] == [f"joint_offset@{joint}"]
     assert informed["detected"]
     assert informed["p_value"] < 1e-6
+    assert "link_geometry" in informed["rivals"]
+    assert "tracker_scale" not in informed["rivals"]
     # The diagnosis has a prior of the size and estimates the pose error; both change
     # the errors very little here.
     assert informed["heldout"] == pytest.approx(verdict["heldout"]["after"], rel=2e-3)

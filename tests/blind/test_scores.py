@@ -162,9 +162,21 @@ def test_an_exact_alias_follows_from_the_effect_and_its_joints(
 
 
 def test_an_arm_without_a_compensator_has_no_alias_of_it():
-    truth = make_truth(("transmission_harmonic", 2), robot="sawyer")
+    truth = make_truth(("transmission_harmonic", 2), robot="xarm7")
     row = build_case_row(PLAN, truth, make_adequate_verdict(), make_oracle())
     assert not row["exact_alias"]
+
+
+@pytest.mark.parametrize(
+    ("rivals", "expected"), [([], True), (["link_weight"], False), (None, False)]
+)
+def test_a_case_is_distinguishable_if_the_oracle_excludes_every_other_mechanism(
+    rivals, expected
+):
+    oracle = make_oracle(rivals=rivals)
+    row = build_case_row(PLAN, PAYLOAD, make_adequate_verdict(), oracle)
+    assert row["distinguishable"] is expected
+    assert row["rivals"] == " + ".join(rivals or [])
 
 
 def test_a_verdict_that_a_fault_of_the_data_ended_has_no_errors_and_states_nothing():

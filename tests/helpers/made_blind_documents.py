@@ -18,7 +18,7 @@ def make_truth(
     *located_effects,
     group=None,
     level=50.0,
-    robot="m900ia260l",
+    robot="rx160",
     setting="usual",
     **changes,
 ):
@@ -119,11 +119,12 @@ def make_adequate_verdict(**changes):
     )
 
 
-def make_oracle(p_value=1e-6, rms=1e-4):
+def make_oracle(p_value=1e-6, rms=1e-4, rivals=None):
     return {
         "candidates": [],
         "p_value": p_value,
         "detected": p_value < 0.05,
+        "rivals": rivals,
         "heldout": {"rms_m": rms},
     }
 

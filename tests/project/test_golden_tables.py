@@ -127,7 +127,7 @@ def _ground_truth(number, group, level):
         group=group,
         level=level,
         campaign=f"case_{number:03}",
-        robot="kuka" if number % 5 == 0 else "m900ia260l",
+        robot="kuka" if number % 5 == 0 else "rx160",
         setting="force_3kN" if group == "setting" else "usual",
     )
     for defect in document["defects"]:

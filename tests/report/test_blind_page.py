@@ -57,14 +57,14 @@ def test_each_quantity_has_its_target_its_power_and_a_column_for_each_robot():
         make_truth(
             ("payload",), ("joint_tilt", 2), group="pair", robot=robot, level=200.0
         )
-        for robot in ("m900ia260l", "sawyer")
+        for robot in ("rx160", "xarm7")
     ]
     both = make_verdict("several", make_effect("payload"), make_effect("joint_tilt", 2))
     summary, page = build_page(
         (pairs[0], both, make_oracle()),
         (pairs[1], make_plain_verdict("named", "payload"), make_oracle()),
         (pairs[1], both, make_oracle()),
-        by_robot={"The heavy one": "m900ia260l", "A soft one": "sawyer"},
+        by_robot={"The heavy one": "rx160", "A soft one": "xarm7"},
     )
     assert page.startswith("# ")
     assert "blind_pictures --config blind=registered seed=7`" in page

@@ -9,23 +9,24 @@ smaller errors by chance.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from scipy.stats import chi2
-
-from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.diagnose import Step
 from elastocal.diagnosis.judge import compare_held_out_errors
-from elastocal.diagnosis.refit import fit_selected_effects
-from elastocal.diagnosis.search import screen_terms
-from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.noise import fit_declared_model, parse_noise
 from elastocal.io.json_files import read_json, write_json
 from elastocal.io.typed_json import to_document
 from elastocal.loop.whole import read_cases
 from elastocal.validation.transfer import find_extrapolated_poses
 from elastocal_proof.blind.folders import load_ground_truth
+from elastocal_proof.blind.known_effects import (
+    LEVEL,
+    ScoredCandidate,
+    compute_wald_p_value,
+    fit_scored_candidates,
+    score_candidates,
+)
+from elastocal_proof.blind.rivals import find_rivals
 from elastocal_proof.plant.kinds import OUTSIDE
 
 if TYPE_CHECKING:
@@ -35,17 +36,6 @@ if TYPE_CHECKING:
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case
-
-LEVEL = 0.05
-
-
-class _ScoredCandidate(NamedTuple):
-    """A candidate at its best shapes, with its log Bayes factor against the declared
-    model."""
-
-    log_bayes_factor: float
-    candidate: Candidate
-    shapes: tuple[float, ...]
 
 
 def fit_oracle(
@@ -57,10 +47,8 @@ def fit_oracle(
 ) -> dict[str, Any] | None:
     """Fit the true effects of one case and test them.
 
-    The test is a Wald test [1]_ of all their coefficients at once: chi-squared, with
-    the covariance of the fit at its shapes. A fitted shape counts as one more degree of
-    freedom, and the p-value is multiplied by the number of variants, a Bonferroni
-    correction [2]_.
+    The test is a Wald test of all their coefficients at once. Its p-value is multiplied
+    by the number of variants, a Bonferroni correction [1]_.
 
     Parameters
     ----------
@@ -75,16 +63,14 @@ def fit_oracle(
     -------
     dict or None
         ``candidates`` in the model; ``p_value``, 1 if the data identify none of them;
-        ``detected`` at the level of 5 %; ``heldout``, errors of the held-out poses as
-        in verdict.json. None if an effect is outside of the catalogue, because no model
-        has that effect.
+        ``detected`` at the level of 5 %; ``rivals``, other mechanisms beside which the
+        true one is not significant, None if it is not detected or if there are several;
+        ``heldout``, errors of the held-out poses as in verdict.json. None if an effect
+        is outside of the catalogue, because no model has that effect.
 
     References
     ----------
-    .. [1] Wald, A., Tests of statistical hypotheses concerning several parameters when
-       the number of observations is large, Transactions of the American Mathematical
-       Society 54, 1943.
-    .. [2] Dunn, O. J., Multiple comparisons among means, Journal of the American
+    .. [1] Dunn, O. J., Multiple comparisons among means, Journal of the American
        Statistical Association 56, 1961.
     """
     defects = truth["defects"]
@@ -93,11 +79,11 @@ def fit_oracle(
     if not defects:
         # Without an effect the declared model is the right one, and the verdict has its
         # errors.
-        return _describe_outcome([], 1.0, verdict["heldout"]["declared"])
+        return _describe_outcome([], 1.0, None, verdict["heldout"]["declared"])
     case, held_out = read_cases(folder, robots_folder)
     noise = parse_noise(verdict).without_pose_error
     declared = fit_declared_model(case.model, case.observations, noise)
-    selected: list[_ScoredCandidate] = []
+    selected: list[ScoredCandidate] = []
     variants = 1
     for defect in defects:
         alternatives = _score_variants(
@@ -106,21 +92,19 @@ def fit_oracle(
         if alternatives:
             variants *= len(alternatives)
             selected += max(alternatives, key=_sum_log_bayes_factors)
-    fitted = fit_selected_effects(
-        declared,
-        case.observations,
-        declared.noise,
-        tuple(
-            (scored.candidate, np.array(scored.shapes, float)) for scored in selected
-        ),
-    )
+    fitted = fit_scored_candidates(declared, case.observations, selected)
     candidates = [scored.candidate for scored in selected]
-    p_value = min(variants * _compute_wald_p_value(fitted, candidates), 1.0)
+    p_value = min(variants * compute_wald_p_value(fitted, candidates), 1.0)
+    rivals = None
+    if p_value < LEVEL and len(truth["case"]["effects"]) == 1:
+        rivals = find_rivals(
+            declared, case.observations, case.candidates.values(), selected
+        )
     outside = find_extrapolated_poses(fitted, case, held_out)
     _, heldout, _ = compare_held_out_errors(
         [Step("oracle", "declared", fitted)], (case, held_out), outside, noise, seed
     )
-    return _describe_outcome(candidates, p_value, to_document(heldout.declared))
+    return _describe_outcome(candidates, p_value, rivals, to_document(heldout.declared))
 
 
 def list_variants(
@@ -142,23 +126,12 @@ def list_variants(
 
 def _score_variants(
     declared: Fit, case: Case, effect: str, joints: Sequence[int]
-) -> list[list[_ScoredCandidate]]:
+) -> list[list[ScoredCandidate]]:
     """Score the variants of an effect that the data can test, each of their candidates
     at its best shapes."""
     variants = list_variants(effect, joints, case.candidates.values())
     candidates = [candidate for variant in variants for candidate in variant]
-    design = build_candidate_design(declared, case.observations, candidates, Settings())
-    if not design.terms:
-        return []
-    problem = design.problem
-    best: dict[str, _ScoredCandidate] = {}
-    _, log_bayes_factors = screen_terms(problem)
-    for term, log_factor in zip(problem.terms, log_bayes_factors, strict=True):
-        if term.candidate is None:
-            continue
-        key = term.candidate.key
-        if key not in best or log_factor > best[key].log_bayes_factor:
-            best[key] = _ScoredCandidate(log_factor, term.candidate, term.shapes)
+    best = score_candidates(declared, case.observations, candidates)
     scored_variants = []
     for variant in variants:
         scored = [best[member.key] for member in variant if member.key in best]
@@ -167,43 +140,22 @@ def _score_variants(
     return scored_variants
 
 
-def _sum_log_bayes_factors(variant: Iterable[_ScoredCandidate]) -> float:
+def _sum_log_bayes_factors(variant: Iterable[ScoredCandidate]) -> float:
     return sum(scored.log_bayes_factor for scored in variant)
 
 
-def _compute_wald_p_value(fitted: Fit, candidates: Sequence[Candidate]) -> float:
-    """Compute the p-value of all coefficients at once, at the fitted shapes."""
-    linear: list[int] = []
-    shapes: list[int] = []
-    for candidate in candidates:
-        indices = fitted.parameter_indices(candidate.key).tolist()
-        linear += indices[: len(candidate.parameters)]
-        shapes += indices[len(candidate.parameters) :]
-    identified = np.flatnonzero(~fitted.unidentifiable)
-    tested = np.isin(identified, linear)
-    if not tested.any():
-        return 1.0
-    values = np.concatenate(
-        [fitted.effect_values(candidate.key)[0] for candidate in candidates]
-    )[np.isin(linear, identified)]
-    information = np.linalg.inv(fitted.covariance[np.ix_(identified, identified)])
-    is_shape = np.isin(identified, shapes)
-    covariance = np.linalg.inv(information[np.ix_(~is_shape, ~is_shape)])
-    is_tested = tested[~is_shape]
-    statistic = values @ np.linalg.solve(
-        covariance[np.ix_(is_tested, is_tested)], values
-    )
-    return float(chi2.sf(statistic, tested.sum() + is_shape.sum()))
-
-
 def _describe_outcome(
-    candidates: Iterable[Candidate], p_value: float, heldout: Mapping[str, Any]
+    candidates: Iterable[Candidate],
+    p_value: float,
+    rivals: list[str] | None,
+    heldout: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Describe the result of the oracle as its file does."""
     return {
         "candidates": [candidate.key for candidate in candidates],
         "p_value": p_value,
         "detected": p_value < LEVEL,
+        "rivals": rivals,
         "heldout": heldout,
     }
 

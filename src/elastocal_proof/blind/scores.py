@@ -45,7 +45,11 @@ EXACT_ALIASES: dict[tuple[str, tuple[int, ...]], str] = {
     ("link_weight", (2,)): "compensator_torque",
 }
 # Results of a case without an oracle.
-_NO_ORACLE: Document = {"detected": np.nan, "heldout": {"rms_m": np.nan}}
+_NO_ORACLE: Document = {
+    "detected": np.nan,
+    "rivals": None,
+    "heldout": {"rms_m": np.nan},
+}
 # Errors got worse if their increase is beyond this many standard errors.
 _STD_ERRORS = 2.0
 # Probability of a credible set.
@@ -150,7 +154,9 @@ def build_case_row(
         ``wrong_name``, a single wrong name is stated; ``false_mechanism``, the verdict
         has an effect for which it names no true mechanism; ``remains``, a repeatable
         residual is reported; ``exact_alias``, the effect lies within the span of
-        another effect that the robot can have, by the ground truth alone.
+        another effect that the robot can have, by the ground truth alone;
+        ``distinguishable``, the oracle detects the effect and excludes every other
+        mechanism.
     """
     oracle = oracle or _NO_ORACLE
     case = truth["case"]
@@ -194,6 +200,8 @@ def build_case_row(
         **_describe_errors(verdict),
         "oracle_detected": float(oracle["detected"]),
         "oracle_rms_m": oracle["heldout"]["rms_m"],
+        "distinguishable": oracle["rivals"] == [],
+        "rivals": " + ".join(oracle["rivals"] or ()),
         **score_probabilities(truth, verdict, _find_hidden_effects(plan, case)),
     }
 
