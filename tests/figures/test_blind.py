@@ -96,11 +96,12 @@ def test_power_has_a_share_for_each_effect_and_level_and_marks_absorbed_effects(
     assert "no case" in texts_in_axes(without_single_effects)[0]
 
 
-def test_reliability_shows_shares_with_their_intervals_and_numbers_of_cases():
+def test_reliability_shows_shares_of_bins_with_cases_enough_and_all_numbers_of_cases():
     rows = [
-        ("all", 0.9, 1.0, 0.97, 0.95, 0.9, 0.99, 100),
-        ("all", 0.3, 0.4, 0.35, 0.25, 0.0, 0.8, 4),
-        ("single", 0.9, 1.0, 0.5, 0.0, 0.0, 0.4, 7),
+        ("all", 0.9, 1.0, 0.97, 0.95, 0.9, 0.99, 107),
+        ("alarm", 0.9, 1.0, 0.97, 0.95, 0.9, 0.99, 100),
+        ("alarm", 0.3, 0.4, 0.35, 0.25, 0.0, 0.8, 4),
+        ("no alarm", 0.9, 1.0, 0.95, 0.5, 0.2, 0.8, 17),
     ]
     table = pd.DataFrame(
         rows, columns=["group", "from", "to", "stated", "rate", "low", "high", "cases"]
@@ -109,12 +110,12 @@ def test_reliability_shows_shares_with_their_intervals_and_numbers_of_cases():
     points = [
         container.lines[0].get_xydata().tolist() for container in shares.containers
     ]
-    assert points == [[[0.97, 0.95], [0.35, 0.25]]]
+    assert points == [[[0.97, 0.95]], [[0.95, 0.5]]]
     intervals = [
         path.vertices[:, 1].tolist() for path in shares.collections[0].get_paths()
     ]
-    assert intervals == [pytest.approx([0.9, 0.99]), pytest.approx([0.0, 0.8])]
-    assert [patch.get_height() for patch in counts.patches] == [100, 4]
+    assert intervals == [pytest.approx([0.9, 0.99])]
+    assert [patch.get_height() for patch in counts.patches] == [100, 4, 17]
     assert "No verdict" in texts_in_axes(draw_reliability(table.iloc[:0]))[0]
 
 

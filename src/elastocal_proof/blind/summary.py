@@ -343,8 +343,11 @@ def estimate_calibration(rows: pd.DataFrame, seed: int) -> dict[str, Any]:
 
 
 def tabulate_reliability(cases: pd.DataFrame) -> pd.DataFrame:
-    """Tabulate the reliability diagram [1]_ for each group of cases, and ``all``, and
-    each bin that has a case.
+    """Tabulate the reliability diagram [1]_ for each group of cases and each bin that
+    has a case.
+
+    Further groups are ``all`` cases, those with an ``alarm``, whose verdict is about
+    causes, and those with ``no alarm``, whose verdict is that nothing is missing.
 
     References
     ----------
@@ -352,9 +355,14 @@ def tabulate_reliability(cases: pd.DataFrame) -> pd.DataFrame:
        forecasts of precipitation and temperature, Applied Statistics 26, 1977.
     """
     stated = cases[cases.stated.notna()]
+    rows_of_groups = {
+        "all": stated,
+        "alarm": stated[stated.detected],
+        "no alarm": stated[~stated.detected],
+        **dict(iter(stated.groupby("group"))),
+    }
     points = []
-    for group in ("all", *sorted(set(stated.group))):
-        rows = stated[(stated.group == group) | (group == "all")]
+    for group, rows in rows_of_groups.items():
         bins = _find_bins(rows.stated.to_numpy(float))
         for number in np.unique(bins).tolist():
             rows_of_bin = rows[bins == number]

@@ -65,6 +65,13 @@ _NO_CASE: dict[str, Any] = {
 }
 # Name of all effects, groups or robots together.
 _ALL = "all"
+# Cases of a bin below which its share says nothing: the 95 % interval is wider than half.
+_LEAST_CASES = 10
+# Groups of the reliability diagram: label, colour and marker.
+_ALARMS = {
+    "alarm": ("after an alarm: the mechanisms stated", PALETTE[0], "o"),
+    "no alarm": ("without an alarm: nothing is missing", PALETTE[1], "s"),
+}
 # Height of a figure without robots, and of the marks of one robot, mm.
 _AXIS_HEIGHT = 20.0
 _ROBOT_HEIGHT = 14.0
@@ -159,9 +166,8 @@ def _draw_intervals(
 @styled
 def draw_reliability(reliability: pd.DataFrame) -> Figure:
     """Draw how often the most probable set of mechanisms is true against its stated
-    probability, and the numbers of cases."""
-    rows = reliability[reliability.group == _ALL]
-    if rows.empty:
+    probability, with an alarm and without one, and the numbers of cases of all bins."""
+    if reliability.empty:
         return draw_note("No verdict of this run states a probability.")
     figure, axes = create_panels(2, 1, 118, height_ratios=(3, 1), sharex=True)
     shares = axes[0, 0]
@@ -169,25 +175,27 @@ def draw_reliability(reliability: pd.DataFrame) -> Figure:
     shares.plot(
         [0, 1], [0, 1], color="black", linewidth=0.8, linestyle=":", label="ideal"
     )
-    shares.errorbar(
-        rows.stated,
-        rows.rate,
-        [rows.rate - rows.low, rows.high - rows.rate],
-        color=_COLOR,
-        marker="o",
-        markersize=4.5,
-        linewidth=1.2,
-        label="verdicts, with 95 % intervals",
-    )
+    for number, (group, (label, color, marker)) in enumerate(_ALARMS.items()):
+        rows = reliability[reliability.group == group]
+        drawn = rows[rows.cases >= _LEAST_CASES]
+        shares.errorbar(
+            drawn.stated,
+            drawn.rate,
+            [drawn.rate - drawn.low, drawn.high - drawn.rate],
+            color=color,
+            marker=marker,
+            markersize=4.5,
+            linewidth=1.2,
+            label=label,
+        )
+        width = rows["to"] - rows["from"]
+        left = rows["from"] + (0.1 + 0.4 * number) * width
+        counts.bar(left, rows.cases, 0.4 * width, align="edge", color=color)
     shares.legend(loc="lower right")
-    width = rows["to"] - rows["from"]
-    counts.bar(
-        rows["from"] + 0.1 * width, rows.cases, 0.8 * width, align="edge", color=_COLOR
-    )
     shares.set(xlim=(0, 1), ylim=(0, 1), ylabel="share of cases in which it is true")
     counts.set(
         yscale="log",
-        xlabel="stated probability of the most probable mechanisms",
+        xlabel="stated probability of the most probable mechanisms, or of none",
         ylabel="cases",
     )
     return figure
