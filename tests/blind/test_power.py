@@ -11,7 +11,7 @@ from elastocal_proof.report.blind_page import format_registration
 
 PAGE = ROBOTS.parents[1] / "docs" / "blind_registration.md"
 SIZE = "registered"
-SEED = 20261129
+SEED = 20261130
 
 
 @pytest.mark.parametrize(

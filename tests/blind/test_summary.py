@@ -16,7 +16,12 @@ from made_blind_documents import (
 )
 from scipy.stats import beta, binom
 
-from elastocal_proof.blind.summary import simulate_calibrated, tabulate_mechanisms
+from elastocal_proof.blind.summary import (
+    find_largest_bin_error,
+    simulate_calibrated,
+    simulate_largest_bin_error,
+    tabulate_mechanisms,
+)
 
 PAYLOAD = make_plain_verdict("named", "payload")
 PAYLOAD_TRUTH = make_truth(("payload",))
@@ -109,6 +114,26 @@ def test_calibrated_statements_have_a_calibration_error_by_chance():
     shares = np.arange(41) / 40
     expected = binom.pmf(np.arange(41), 40, 0.75) @ np.abs(shares - 0.75)
     assert by_chance == pytest.approx(expected, rel=0.05)
+
+
+def test_the_largest_bin_error_is_that_of_the_worst_bin_with_cases_enough():
+    probability = np.repeat([0.25, 0.55, 0.95], [20, 40, 60])
+    correct = np.zeros(120, bool)
+    # All of the first bin are wrong, 18 of 40 and 54 of 60 of the others are correct.
+    correct[20:38] = True
+    correct[60:114] = True
+    rows = pd.DataFrame({"stated": probability, "correct": correct})
+    assert find_largest_bin_error(rows)["rate"] == pytest.approx(0.55 - 18 / 40)
+    assert np.isnan(find_largest_bin_error(rows[:20])["rate"])
+
+
+def test_calibrated_statements_have_a_largest_bin_error_by_chance():
+    rows = pd.DataFrame({"stated": [0.75] * 40})
+    by_chance = simulate_largest_bin_error(rows, 1)
+    deviations = np.abs(np.arange(41) / 40 - 0.75)
+    probability = binom.pmf(np.arange(41), 40, 0.75)
+    assert probability[deviations < by_chance["rate"]].sum() < 0.5
+    assert probability[deviations <= by_chance["high"] + 1e-9].sum() >= 0.95
 
 
 def test_mechanisms_are_counted_by_what_is_stated():

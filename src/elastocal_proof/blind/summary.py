@@ -37,6 +37,8 @@ _BATCH = 200
 NEAR_ORACLE = 1.05
 # Bins of the reliability diagram and of the calibration error.
 _BINS = 10
+# Cases of a bin below which its error is chance: the standard error is nine points.
+_LEAST_BIN_CASES = 30
 _LIMITS = ("target_low", "target_high", "power", "risk")
 _RELIABILITY = ["group", "from", "to", "stated", "hits", "cases", "rate", "low", "high"]
 _COUNTED = [
@@ -173,6 +175,10 @@ def _measure(
         yield _describe_figure(words, estimate_calibration(rows, seed), target)
     elif measure == "chance_calibration_error":
         yield _describe_figure(words, simulate_calibrated(rows, seed), target)
+    elif measure == "largest_bin_error":
+        yield _describe_figure(words, find_largest_bin_error(rows), target)
+    elif measure == "chance_largest_bin_error":
+        yield _describe_figure(words, simulate_largest_bin_error(rows, seed), target)
     elif measure == "removed":
         squares = [
             rows[name].to_numpy(float) ** 2
@@ -313,6 +319,54 @@ def compute_calibration_error(
         np.abs((differences * (bins == number)).sum(axis=-1)) for number in range(_BINS)
     ]
     return sum(gaps) / cases
+
+
+def compute_largest_bin_error(
+    probability: np.ndarray, correct: np.ndarray
+) -> np.ndarray:
+    """Compute the largest difference between the mean stated probability and the share
+    of correct statements among the bins with enough cases.
+
+    Parameters
+    ----------
+    probability : (n,) array
+        Stated probabilities.
+    correct : (..., n) array
+        Whether the statements are correct.
+
+    Returns
+    -------
+    (...,) array
+        Not a number if no bin has enough cases.
+    """
+    bins = _find_bins(probability)
+    differences = probability - correct
+    gaps = [
+        np.abs(differences[..., bins == number].mean(axis=-1))
+        for number in range(_BINS)
+        if (bins == number).sum() >= _LEAST_BIN_CASES
+    ]
+    return np.max(gaps, axis=0) if gaps else np.full(correct.shape[:-1], np.nan)
+
+
+def find_largest_bin_error(rows: pd.DataFrame) -> dict[str, Any]:
+    """Find the largest error of a bin of stated cases. The errors of its bins by chance
+    are its uncertainty."""
+    error = compute_largest_bin_error(
+        rows.stated.to_numpy(float), rows.correct.to_numpy(bool)
+    )
+    return _describe_estimate(len(rows), float(error), np.nan, np.nan)
+
+
+def simulate_largest_bin_error(rows: pd.DataFrame, seed: int) -> dict[str, Any]:
+    """Simulate the largest error of a bin of calibrated verdicts that state the same
+    probabilities: its median and the range of 95 %."""
+    probability = rows.stated.to_numpy(float)
+    draws = open_stream(seed, "blind", "largest bin error by chance", 0)
+    outcomes = draws.random((_RESAMPLES, len(rows))) < probability
+    errors = compute_largest_bin_error(probability, outcomes)
+    low, median, high = np.quantile(errors, [0.025, 0.5, 0.975]).tolist()
+    return _describe_estimate(len(rows), median, low, high)
 
 
 def estimate_calibration(rows: pd.DataFrame, seed: int) -> dict[str, Any]:
