@@ -3,7 +3,8 @@ robot is measured without a tracker.
 
 A simulated UR10 with errors of its geometry, which the campaign declares, is measured by
 each kind: a ball in three sockets, a tip on three planes, a draw wire from three anchors,
-and a camera on the flange before a board, whose noise is estimated or declared. Every
+and a camera on the flange before a board, whose noise is estimated or declared, and whose
+frame has its origin in the middle or, as OpenCV has it, at a corner. Every
 second robot also has a clear effect at a joint that is drawn. The oracle knows effect,
 joint and noise, and tests the effect on the same data. `python benchmarks/instruments.py
 CASES SEED [KIND ...]` prints a row a kind with 95 % intervals (Clopper and Pearson, 1934),
@@ -18,6 +19,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from common import ROBOTS
 from rates import format_rate, make_parser
+from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.writing import write_campaign
@@ -64,6 +66,8 @@ PLACES_RAD = np.array([[0.0] * 6, [0.5, 0.1, 0.1, 0, 0, 0], [-0.4, 0.2, -0.3, 0,
 NORMALS = np.array([[0.0, 0.0, 1.0], [0.8, 0.6, 0.0], [0.0, 0.8, 0.6]])
 ANCHORS_M = np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.5], [0.5, -1.2, 0.2]])
 BOARD_M = 0.25
+# Place of the middle of the board in a frame at one of its corners.
+MIDDLE_M = np.array([0.1, 0.15, 0.0])
 # Play of a printed socket, form of a granite table, and noise of a draw wire, m.
 NOISE_M = {"point": 1e-4, "plane": 3e-5, "distance": 1e-4}
 # Error of the corners of a board, an angle of view, rad, and what it makes of the board in
@@ -178,14 +182,15 @@ def _measure_features(kind, measure):
     return Measured(np.array([angles for angles, _ in rows]), columns, document)
 
 
-def measure_board(workshop, noise=None):
+def measure_board(workshop, noise=None, middle_m=(0.0, 0.0, 0.0)):
     """See a board half a metre before the tool in the middle of the workspace. Its noise
-    is estimated unless it is declared."""
+    is estimated unless it is declared; its middle is at `middle_m` in its frame."""
     position, rotation = workshop.find_tool(MIDDLE_RAD)
     board = position + 0.5 * rotation[:, 2], rotation
     angles = np.array([find_view(workshop, board) for _ in range(BOARD_ROWS)])
     poses = [see_board(workshop, row, board, VIEW_RAD, BOARD_M) for row in angles]
     numbers = np.array([np.concatenate(pose) for pose in poses])
+    numbers[:, :3] -= Rotation.from_rotvec(numbers[:, 3:]).apply(middle_m)
     columns = dict(zip(("x", "y", "z", "rx", "ry", "rz"), numbers.T, strict=True))
     document = {
         "camera": "on_robot",
@@ -203,6 +208,7 @@ INSTRUMENTS = {
     "point": measure_point,
     "board": measure_board,
     "board_declared": partial(measure_board, noise=DECLARED_NOISE),
+    "board_corner": partial(measure_board, middle_m=MIDDLE_M),
     "plane": measure_plane,
     "distance": measure_distance,
 }

@@ -37,7 +37,7 @@ _RADIANS = {
 }
 _QUANTITY = re.compile(r"(\d+(?:\.\d*)?|\.\d+)\s*([a-zµ°]+)")
 # Lower bound on lengths (m) and angles (rad): no instrument repeats better
-# (`fitting.noise.FINEST_RESOLUTION`).
+# (`fitting.sensor_noise.FINEST_RESOLUTION`).
 _SMALLEST = 1e-8
 # Upper bounds on lengths and angles: tolerances and noise are never larger.
 _LARGEST_M = 0.1

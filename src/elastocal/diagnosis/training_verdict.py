@@ -30,6 +30,7 @@ from elastocal.diagnosis.verdict import (
     warn_of_excess_scatter,
 )
 from elastocal.fitting.model import get_joint_compliances
+from elastocal.fitting.sensor_noise import compute_target_std_m
 from elastocal.validation.held_out import compute_scatter
 from elastocal.verdict import (
     Compliances,
@@ -197,13 +198,21 @@ def _state_evidence(
             refit.predict_reduced_chi_square(design.problem, posterior.empty_model),
             refit.predict_reduced_chi_square(design.problem, best_model),
         ),
-        other_models_m=other_models * result.noise.position_m,
+        other_models_m=other_models * _compute_target_noise_m(result),
         compliance_urad_per_Nm=_state_compliances(
             declared, result.steps[-1].fitted, kept_average, settings.prior_share
         ),
         candidates_tested=len(tested),
         untestable=design.untestable,
         warnings=_warn_of_search(evidence, result.full_model, effects, settings),
+    )
+
+
+def _compute_target_noise_m(result: TrainingResult) -> float:
+    """Noise of a coordinate of the target, m, as shown or declared."""
+    final = result.steps[-1].fitted
+    return compute_target_std_m(
+        final.model, final.estimate, result.case.observations, result.noise
     )
 
 

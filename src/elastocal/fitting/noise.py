@@ -37,7 +37,12 @@ from elastocal.fitting.observations import (
     select_states,
     separate_approaches,
 )
-from elastocal.fitting.sensor_noise import ShapedNoise, estimate_factors
+from elastocal.fitting.sensor_noise import (
+    FINEST_RESOLUTION,
+    ShapedNoise,
+    compute_sensor_axes,
+    estimate_factors,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -57,8 +62,6 @@ if TYPE_CHECKING:
 MIN_CONTRASTS_FOR_JOINTS = 60
 MIN_CONTRASTS = 9
 MAX_CONTRASTS = 20_000
-# No sensor repeats better than this, m or rad: a sixtieth of the wavelength of a laser.
-FINEST_RESOLUTION = 1e-8
 # Half width of the interval that holds 95 % of a normal distribution, in standard
 # deviations (JCGM 100:2008, section 6).
 _COVERAGE_FACTOR = 1.959964
@@ -231,23 +234,36 @@ def estimate_noise(case: Case) -> tuple[Noise, list[str]]:
     noise, warnings = choose_noise(case.campaign, case.model, start)
     if noise is not None:
         return noise, warnings
-    joints = np.zeros(case.campaign.robot.joints)
-    assumed = Noise("residual", _ASSUMED_NOISE, _ASSUMED_NOISE, joints)
     # The widest prior leaves nearly the same residual as no prior, without parameters
     # that nothing determines.
     model = set_prior_scale(case.model, PRIOR_SCALES[-1])
-    residual = fit_model(model, case.observations, assumed, start).residual
-    noise = replace(
-        assumed,
-        position_m=_limited_rms(residual[:, :3]),
-        orientation_rad=_limited_rms(residual[:, -3:]),
-    )
+    noise = _estimate_residual_level(case, model, start)
     # Fitted parameters have absorbed a part of the noise, which makes the residual too
     # small.
     fitted = fit_model(
         model, case.observations, noise, start, tolerance=INTERMEDIATE_TOLERANCE
     )
     return noise.scaled(maximize_evidence(fitted).noise_factor), warnings
+
+
+def _estimate_residual_level(case: Case, model: Model, start: Estimate) -> Noise:
+    """Estimate noise from the residual of a model, or take that of its shaped noise,
+    which was estimated from such a residual.
+
+    The residual of a pose that was converted, such as that of a camera on a board, is no
+    error of what is read: a rotation moves it by its distance from the board.
+    """
+    joints = np.zeros(case.campaign.robot.joints)
+    if model.shaped_noise is not None:
+        position_m, orientation_rad = model.shaped_noise.average(case.observations)
+        return Noise("residual", float(position_m), float(orientation_rad), joints)
+    assumed = Noise("residual", _ASSUMED_NOISE, _ASSUMED_NOISE, joints)
+    residual = fit_model(model, case.observations, assumed, start).residual
+    return replace(
+        assumed,
+        position_m=_limited_rms(residual[:, :3]),
+        orientation_rad=_limited_rms(residual[:, -3:]),
+    )
 
 
 def _limited_rms(residual: np.ndarray) -> float:
@@ -431,6 +447,9 @@ def _compute_contrasts(
     linear_model = linearize(nominal_model, nominal, observations, conditions)
     if observations.spread is not None:
         linear_model = _standardize(linear_model, observations.spread)
+    axes = compute_sensor_axes(nominal_model, nominal, observations)
+    if axes is not None:
+        linear_model = _refer_to_readings(linear_model, axes)
     stacks = [
         _contrast_repeats(linear_model, members)
         for members in _stack_repeats(observations, averaged_state)
@@ -452,6 +471,19 @@ def _standardize(linear_model: LinearModel, spread: np.ndarray) -> LinearModel:
         linear_model,
         residual=linear_model.residual / spread[:, None],
         columns=replace(columns, jacobian=columns.jacobian / spread[:, None, None]),
+    )
+
+
+def _refer_to_readings(linear_model: LinearModel, axes: np.ndarray) -> LinearModel:
+    """Express residuals and Jacobians as errors of what is read, by the residuals
+    (M, r, r) that these cause."""
+    columns = linear_model.columns
+    residual = np.linalg.solve(axes, linear_model.residual[..., None])[..., 0]
+    jacobian = np.linalg.solve(axes, columns.jacobian)
+    return replace(
+        linear_model,
+        residual=residual,
+        columns=replace(columns, jacobian=jacobian),
     )
 
 
@@ -585,25 +617,25 @@ def estimate_shaped_noise(case: Case) -> ShapedNoise | None:
     """Estimate the noise of a kind that states its shape, such as that of a camera.
 
     Fits of the declared model and estimates of the factors alternate. What the model
-    lacks counts as noise here; a diagnosis estimates the level of the noise again.
+    lacks counts as noise here; a diagnosis estimates the level of the noise again. If
+    the campaign declares its noise, that is the noise of what is read, and has the
+    estimated shape.
 
-    Returns None if the kind states no shape, or if the campaign declares its noise.
+    Returns None if the kind states no shape.
     """
     plan = case.campaign.measuring
     kind = plan.kinds[0]
     observations = case.observations
-    is_declared = _read_declared_noise(case.campaign) is not None
-    if plan.channels or is_declared or not len(observations):
+    if plan.channels or not len(observations) or observations.rotation is None:
         return None
-    if observations.rotation is None:
-        return None
-    options = {"camera": plan.camera}
-    if not kind.shape_noise(observations.position, observations.rotation, options):
+    poses = observations.position, observations.rotation
+    options = kind.refer_noise(*poses, {"camera": plan.camera})
+    if not kind.shape_noise(*poses, options):
         return None
     joints = np.zeros(case.campaign.robot.joints)
     noise = Noise("residual", _ASSUMED_NOISE, _ASSUMED_NOISE, joints)
     model = case.model
-    shaped = ShapedNoise(kind, plan.camera, np.ones(1))
+    shaped = ShapedNoise(kind, options, np.ones(1))
     for _ in range(_SHAPE_ROUNDS):
         fitted = fit_declared_model(model, observations, noise)
         session = fitted.estimate.index_sessions(observations)
@@ -613,7 +645,8 @@ def estimate_shaped_noise(case: Case) -> ShapedNoise | None:
         shaped = estimate_factors(shaped, observations, residual)
         model = replace(model, shaped_noise=shaped)
         noise = replace(noise, position_m=shaped.reference_m)
-    return shaped
+    declared = _read_declared_noise(case.campaign)
+    return shaped if declared is None else shaped.declare(observations, declared)
 
 
 def find_declared_geometry(model: Model) -> set[str]:

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
+
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
@@ -15,6 +18,8 @@ if TYPE_CHECKING:
 
 # Median of the square of a standard normal number.
 _MEDIAN_OF_SQUARES = 0.4549364
+# No sensor repeats better than this, m or rad: a sixtieth of the wavelength of a laser.
+FINEST_RESOLUTION = 1e-8
 
 
 @dataclass(frozen=True)
@@ -24,27 +29,23 @@ class ShapedNoise:
     Attributes
     ----------
     kind : Kind
-    camera : str, where the camera of a board is
+    options : what the shape depends on besides the poses, as of `Kind.refer_noise`
     factors : (G,) array, standard deviation of each group of errors, m or rad
     reference_m : float
         RMS standard deviation of a coordinate that is read, such as that of the board in
         the camera. The noise of a fit scales all factors by what it has instead.
-    range_m : float or None
-        Range at which the errors are as large as the factors; None for the median.
     """
 
     kind: Kind
-    camera: str
+    options: Mapping[str, Any]
     factors: np.ndarray
     reference_m: float = 1.0
-    range_m: float | None = None
 
     def describe(self, observations: Observations) -> NoiseShape:
         """Describe the shape of the noise of observations."""
         assert observations.rotation is not None
-        options = {"camera": self.camera, "range_m": self.range_m}
         shape = self.kind.shape_noise(
-            observations.position, observations.rotation, options
+            observations.position, observations.rotation, self.options
         )
         assert shape is not None
         return shape
@@ -56,9 +57,24 @@ class ShapedNoise:
 
     def refer(self, observations: Observations) -> ShapedNoise:
         """State the RMS standard deviation of a coordinate of what is read."""
+        return replace(self, reference_m=float(self.average(observations)[0]))
+
+    def declare(self, observations: Observations, noise: Noise) -> ShapedNoise:
+        """Scale the errors of position and those of rotation to declared noise, which is
+        the RMS of what is read. Only ratios within each of the two remain estimated."""
         shape = self.describe(observations)
-        deviations = (shape.sizes * self.factors[shape.groups])[:, :3]
-        return replace(self, reference_m=float(np.sqrt((deviations**2).mean())))
+        declared = np.array([noise.position_m, noise.orientation_rad])
+        scale = np.repeat(declared / self.average(observations), 3)
+        factors = self.factors.copy()
+        factors[shape.groups] *= scale
+        return replace(self, factors=factors, reference_m=noise.position_m)
+
+    def average(self, observations: Observations) -> np.ndarray:
+        """RMS standard deviations (2,) of the coordinates and of the rotations that are
+        read, m and rad."""
+        shape = self.describe(observations)
+        deviations = shape.sizes * self.factors[shape.groups]
+        return np.sqrt((deviations.reshape(-1, 2, 3) ** 2).mean(axis=(0, 2)))
 
 
 def compute_sensor_roots(
@@ -83,12 +99,46 @@ def compute_sensor_roots(
             return None
         deviations = observations.spread[:, None] * noise.sensor_std(rows)
         return deviations[:, None] * np.eye(rows)
+    shaped = model.shaped_noise
+    scale = noise.position_m / shaped.reference_m
+    roots = shaped.compute_roots(observations)
+    return scale * _turn_into_base(estimate, observations, roots)
+
+
+def compute_target_std_m(
+    model: Model, estimate: Estimate, observations: Observations, noise: Noise
+) -> float:
+    """Compute the standard deviation, m, of a coordinate of the target in a measurement.
+
+    It is that of what is read, unless the pose of the target is converted from it: then
+    it is the RMS over the observations.
+    """
+    if model.shaped_noise is None:
+        return noise.position_m
+    roots = compute_sensor_roots(model, estimate, observations, noise)
+    assert roots is not None
+    return float(np.sqrt((roots[:, :3] ** 2).sum(axis=2).mean()))
+
+
+def compute_sensor_axes(
+    model: Model, estimate: Estimate, observations: Observations
+) -> np.ndarray | None:
+    """Compute the residual (M, rows, rows), in base axes, that a unit of each error of
+    what is read causes; None if the residual is that error."""
+    if model.shaped_noise is None:
+        return None
+    axes = model.shaped_noise.describe(observations).axes
+    return _turn_into_base(estimate, observations, axes)
+
+
+def _turn_into_base(
+    estimate: Estimate, observations: Observations, columns: np.ndarray
+) -> np.ndarray:
+    """Turn columns (M, 6, C) from the axes of the session into base axes."""
     session = estimate.index_sessions(observations)
     into_base = estimate.frame_rotation[session].transpose(0, 2, 1)
-    roots = model.shaped_noise.compute_roots(observations)
-    scale = noise.position_m / model.shaped_noise.reference_m
-    turned = [into_base @ roots[:, :3], into_base @ roots[:, 3:]]
-    return scale * np.concatenate(turned, axis=1)
+    turned = [into_base @ columns[:, :3], into_base @ columns[:, 3:]]
+    return np.concatenate(turned, axis=1)
 
 
 def standardize_residual(
@@ -113,5 +163,6 @@ def estimate_factors(
     factors = []
     for group in range(shape.groups.max() + 1):
         squares = errors[:, shape.groups == group] ** 2
-        factors.append(np.sqrt(np.median(squares) / _MEDIAN_OF_SQUARES))
+        deviation = np.sqrt(np.median(squares) / _MEDIAN_OF_SQUARES)
+        factors.append(max(float(deviation), FINEST_RESOLUTION))
     return replace(shaped, factors=np.array(factors)).refer(observations)

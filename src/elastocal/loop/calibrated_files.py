@@ -29,7 +29,8 @@ from elastocal.application.statements import describe_left_out, tabulate_errors
 from elastocal.campaigns.campaign_folder import CampaignFolder, read_campaign_folder
 from elastocal.diagnosis.misplaced import describe_reference_point
 from elastocal.errors import InputError
-from elastocal.fitting.noise import parse_noise
+from elastocal.fitting.noise import get_noise, parse_noise
+from elastocal.fitting.sensor_noise import compute_target_std_m
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import digest_configuration
 from elastocal.io.records import check_sources, trace_jobs
@@ -101,12 +102,14 @@ class DiagnosedCampaign:
         regression = None
         remainder = self.verdict.remainder
         if remainder and remainder.regression and remainder.spread:
+            observations = self.case.observations
+            noise = get_noise(self.verdict.noise)
             regression = build_residual_model(
                 self.case,
                 estimate,
-                fit_to_observations(remainder, model, estimate, self.case.observations),
+                fit_to_observations(remainder, model, estimate, observations),
                 remainder,
-                self.verdict.noise.position_m,
+                compute_target_std_m(model, estimate, observations, noise),
             )
         robot = calibrate_on_case(
             self.case,

@@ -25,6 +25,8 @@ from elastocal.diagnosis.misplaced import find_misplaced_frames
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.cases import build_case
 from elastocal.fitting.model import Case
+from elastocal.fitting.noise import get_noise
+from elastocal.fitting.sensor_noise import compute_target_std_m
 from elastocal.io.json_files import read_json
 from elastocal.io.origin import describe_provenance
 from elastocal.io.storage import write_table
@@ -134,16 +136,20 @@ def build_calibrated_robot(
     """
     case = diagnosis.case
     final = diagnosis.final
-    residual = compute_position_residuals(
-        *transfer_fit(final, case, held_out), held_out.observations
-    )
-    # What the model leaves beyond this noise counts as an error of the robot.
-    noise_m = diagnosis.verdict.noise.position_m
+    transferred = transfer_fit(final, case, held_out)
+    residual = compute_position_residuals(*transferred, held_out.observations)
+    noise = get_noise(diagnosis.verdict.noise)
+    # What the model leaves beyond the noise counts as an error of the robot.
+    noise_m = compute_target_std_m(*transferred, held_out.observations, noise)
     regression = None
     if delivered is not None and delivered.predictor is not None and not physics_only:
         residual = delivered.residual
         regression = build_residual_model(
-            case, final.estimate, delivered.predictor, delivered.choice, noise_m
+            case,
+            final.estimate,
+            delivered.predictor,
+            delivered.choice,
+            compute_target_std_m(final.model, final.estimate, case.observations, noise),
         )
     robot = calibrate_on_case(
         case, final.model, final.estimate, final.covariance, final.noise, regression

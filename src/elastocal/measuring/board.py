@@ -30,6 +30,9 @@ BESIDE_ROBOT = "beside_robot"
 # Lower bound on the cosine of the obliquity; no corners are detected on a board that is
 # seen more obliquely.
 _GRAZING = 0.2
+# Distance of the middle of a board from the optical axis of a usual image, m: half of
+# the board that `elastocal board` prints.
+_OFF_AXIS_M = 0.1
 
 
 class Board(Pose):
@@ -69,6 +72,29 @@ class Board(Pose):
         inverse = rotation.transpose(0, 2, 1)
         return -(inverse @ position[..., None])[..., 0], inverse
 
+    def refer_noise(
+        self, position: np.ndarray, rotation: np.ndarray, options: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        """Locate the middle of the board, in its own frame, and find the median range.
+
+        The middle is the point of the board's plane that is closest to the optical axes
+        of all images, by least squares, because a camera is turned to the board. The
+        prior that it is within the usual range of the origin matters only if the axes
+        lie in this plane.
+        """
+        board_position, board_rotation = self.convert(position, rotation, options)
+        into_board = board_rotation.transpose(0, 2, 1)
+        camera = -(into_board @ board_position[..., None])[..., 0]
+        axis = into_board[:, :, 2]
+        across = np.eye(3) - axis[:, :, None] * axis[:, None, :]
+        prior = np.eye(2) * (_OFF_AXIS_M / self.limits["range_m"]) ** 2
+        target = np.einsum("mij,mj->i", across, camera)[:2]
+        in_plane = np.linalg.solve(across.sum(axis=0)[:2, :2] + prior, target)
+        middle = np.append(in_plane, 0.0)
+        sight = board_position + board_rotation @ middle
+        median_m = float(np.median(np.linalg.norm(sight, axis=1)))
+        return {**options, "middle_m": middle, "range_m": median_m}
+
     def shape_noise(
         self, position: np.ndarray, rotation: np.ndarray, options: Mapping[str, Any]
     ) -> NoiseShape | None:
@@ -80,17 +106,24 @@ class Board(Pose):
         image. Errors of rotation grow with the range. Rotations about axes in the board
         also become less certain with obliquity, because an oblique board is narrower in
         the image. The rotation about the normal is the most certain one.
+
+        These errors are those of the middle of the board, about which its rotation is
+        uncertain. The origin of its frame, which is often a corner, also moves by the
+        rotation times its distance from the middle.
         """
         board_position, board_rotation = self.convert(position, rotation, options)
-        range_m = np.linalg.norm(board_position, axis=1)
+        lever = board_rotation @ np.asarray(options.get("middle_m", np.zeros(3)))
+        sight = board_position + lever
+        range_m = np.linalg.norm(sight, axis=1)
         reference_m = options.get("range_m") or np.median(range_m)
         ratio = (range_m / reference_m)[:, None]
         normal = board_rotation[:, :, 2]
-        cosine = np.abs((normal * board_position).sum(axis=1)) / range_m
+        cosine = np.abs((normal * sight).sum(axis=1)) / range_m
         tilting = ratio / np.maximum(cosine, _GRAZING)[:, None]
         sizes = np.hstack([ratio, ratio, ratio**2, tilting, tilting, ratio])
         axes = np.zeros((len(board_position), 6, 6))
         axes[:, :3, :3] = np.eye(3)
+        axes[:, :3, 3:] = form_cross_matrices(lever) @ board_rotation
         axes[:, 3:, 3:] = board_rotation
         if options.get("camera", ON_ROBOT) == ON_ROBOT:
             # The measured pose is that of the camera on the board: the inverse of the

@@ -176,6 +176,13 @@ class Kind:
         """Convert measurements (N, 3), (N, 3, 3) to poses of the target in the session."""
         return position, rotation
 
+    def refer_noise(
+        self, position: np.ndarray, rotation: np.ndarray, options: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        """Add to the options what the shape of the noise takes from all measured poses
+        (M, 3), (M, 3, 3) of a campaign, so that it is the same for a subset of them."""
+        return dict(options)
+
     def shape_noise(
         self, position: np.ndarray, rotation: np.ndarray, options: Mapping[str, Any]
     ) -> NoiseShape | None:

@@ -213,9 +213,7 @@ def _shape_noise(survey: Survey) -> ShapedNoise | None:
         return None
     factors = np.full(shape.groups.max() + 1, survey.orientation_rad)
     factors[shape.groups[:3]] = survey.position_m
-    camera = setup.options.get("camera", "")
-    range_m = setup.options.get("range_m")
-    return ShapedNoise(setup.kind, camera, factors, survey.position_m, range_m)
+    return ShapedNoise(setup.kind, setup.options, factors, survey.position_m)
 
 
 def compute_information_rows(
