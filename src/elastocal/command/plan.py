@@ -219,6 +219,7 @@ def plan(
         poses * survey.numbers,
         chosen.parameters,
         chosen.effective_parameters,
+        [measured],
     )
     worth = [*sentences, *(f"{warning}." for warning in warnings)]
     rows = _write_campaign(folder, robot, survey, cell, chosen, worth)

@@ -302,7 +302,7 @@ def _list_shortcomings(
     case: Case, declared: Fit, training: Measurements, held_out: Measurements
 ) -> list[str]:
     """Return what too few or one-sided measurements cannot show."""
-    shortcomings = _warn_of_few_poses(declared, _count_poses(training))
+    shortcomings = _warn_of_few_poses(case, declared, _count_poses(training))
     states = case.observations.states
     if states.repeats.max() == 1:
         shortcomings.append(
@@ -333,11 +333,12 @@ def _list_shortcomings(
     return shortcomings
 
 
-def _warn_of_few_poses(declared: Fit, poses: int) -> list[str]:
+def _warn_of_few_poses(case: Case, declared: Fit, poses: int) -> list[str]:
     """Return a warning if poses are too few for the parameters of the declared model."""
     return warn_of_few_poses(
         poses,
         declared.residual.size,
         int((~declared.unidentifiable).sum()),
         count_effective_parameters(declared),
+        [kind.name for kind in case.campaign.measuring.kinds],
     )
