@@ -35,7 +35,7 @@ def test_each_candidate_of_a_contact_touches_and_comes_from_outside(kind):
     survey = make_kind_survey(kind)
     candidates = find_candidates(survey)
     position, rotation = locate(survey, candidates)
-    places = np.array(list(survey.setup.places.values()))[candidates.place]
+    places = np.array(list(survey.setup.places.values()))[candidates.place_index]
     offset = position - places[:, :3]
     if kind == "point":
         height, normal = np.linalg.norm(offset, axis=1), places[:, 3:]
@@ -49,7 +49,7 @@ def test_each_candidate_of_a_contact_touches_and_comes_from_outside(kind):
     cosine = -(rotation[:, :, 2] * normal).sum(axis=1)
     assert cosine.min() >= np.cos(np.radians(60.0)) - 1e-9
     # All places are measured, within the limits, in different postures.
-    assert set(candidates.place) == set(range(len(survey.setup.places)))
+    assert set(candidates.place_index) == set(range(len(survey.setup.places)))
     angles = survey.robot.model_angles(candidates.joint_angles)
     assert not find_beyond_limits(survey.robot, angles).any()
     assert np.ptp(angles, axis=0).min() > 1.0
@@ -86,7 +86,7 @@ def test_lengths_and_strokes_stay_within_their_limits(kind):
     survey = make_kind_survey(kind)
     candidates = find_candidates(survey)
     position, _ = locate(survey, candidates)
-    places = np.array(list(survey.setup.places.values()))[candidates.place]
+    places = np.array(list(survey.setup.places.values()))[candidates.place_index]
     offset = position - places[:, :3]
     if kind == "distance":
         length = np.linalg.norm(offset, axis=1)
@@ -122,7 +122,7 @@ def test_a_plan_measures_each_feature():
     survey = make_kind_survey("plane")
     plan = choose_plan(survey, find_candidates(survey, 300), 100, 5, 1)
     # Three parameters of a plane, and what it says of the robot.
-    assert np.bincount(plan.fitted.place).min() > 3
+    assert np.bincount(plan.fitted.place_index).min() > 3
 
 
 def test_the_way_out_of_an_arm_is_along_its_last_length():

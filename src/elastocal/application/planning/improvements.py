@@ -87,7 +87,7 @@ def _compute_accuracy(
 ) -> float:
     """Compute the accuracy of a changed survey, as `survey` states it, m."""
     rows = compute_information_rows(
-        changed, fitted.joint_angles, fitted.force, fitted.place
+        changed, fitted.joint_angles, fitted.force, fitted.place_index
     )
     flat = rows.reshape(-1, rows.shape[2])
     information = add_prior(copies * (flat.T @ flat))

@@ -63,17 +63,17 @@ class Candidates:
     ----------
     joint_angles : (N, n) as the controller reports them, rad.
     force : (N, 3) full load, N, base axes.
-    place : (N,) int, place of the set-up that is measured in each; None for a tracker.
+    place_index : (N,) int, place of the set-up that is measured in each; None for a tracker.
     """
 
     joint_angles: np.ndarray
     force: np.ndarray
-    place: np.ndarray | None = None
+    place_index: np.ndarray | None = None
 
     def select(self, chosen: np.ndarray | list[int] | slice) -> Candidates:
         """Select configurations by their numbers."""
-        place = None if self.place is None else self.place[chosen]
-        return Candidates(self.joint_angles[chosen], self.force[chosen], place)
+        place_index = None if self.place_index is None else self.place_index[chosen]
+        return Candidates(self.joint_angles[chosen], self.force[chosen], place_index)
 
 
 @dataclass(frozen=True)
@@ -122,12 +122,12 @@ def find_allowed_candidates(
     halton = qmc.Halton(robot.commands, seed=seed)
     shares = halton.random(_DRAWS_PER_CANDIDATE * count)
     angles = robot.spread_angles(shares, robot.joint_limits)
-    place = None
+    place_index = None
     if survey.setup is not None:
-        angles, place = _find_measurable(survey.setup, robot, angles)
+        angles, place_index = _find_measurable(survey.setup, robot, angles)
     is_within = ~find_beyond_limits(robot, angles).any(axis=1)
     angles = angles[is_within]
-    place = None if place is None else place[is_within]
+    place_index = None if place_index is None else place_index[is_within]
     reported = robot.reported_angles(angles)
     checks = check_configurations(cell, robot, survey.targets, reported)
     allowed = np.flatnonzero(np.all(list(checks.values()), axis=0))[:count]
@@ -142,7 +142,7 @@ def find_allowed_candidates(
         )
     forces = survey.draw_forces(len(allowed), np.random.default_rng(seed))
     return Candidates(
-        reported[allowed], forces, None if place is None else place[allowed]
+        reported[allowed], forces, None if place_index is None else place_index[allowed]
     )
 
 
@@ -151,15 +151,16 @@ def _find_measurable(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Find configurations in which a set-up can measure near random ones (N, n).
 
-    Returns angles (M, n) of the chain, rad, and the place (M,) that is measured in each.
+    Returns angles (M, n) of the chain, rad, and the index (M,) of the place that is
+    measured in each.
 
     Raises `InputError`: there are none at some place.
     """
-    place = np.arange(len(angles)) % len(setup.places)
-    moved, checks = reach_places(setup, robot, angles, place)
+    place_index = np.arange(len(angles)) % len(setup.places)
+    moved, checks = reach_places(setup, robot, angles, place_index)
     is_measurable = np.all(list(checks.values()), axis=0)
     for index, name in enumerate(setup.places):
-        of_place = place == index
+        of_place = place_index == index
         if not is_measurable[of_place].any():
             strictest = min(checks, key=lambda check: checks[check][of_place].mean())
             total = format_count(int(of_place.sum()), "configuration")
@@ -169,7 +170,7 @@ def _find_measurable(
                 f"none of {total}: {strictest}",
                 "another place",
             )
-    return moved[is_measurable], place[is_measurable]
+    return moved[is_measurable], place_index[is_measurable]
 
 
 def choose_plan(
@@ -195,7 +196,7 @@ def choose_plan(
     owners = [owner for owner, _ in list_parameters(*declare_model(survey))]
     _check_counts(survey, len(owners), count, poses, held_out)
     rows = compute_information_rows(
-        survey, candidates.joint_angles, candidates.force, candidates.place
+        survey, candidates.joint_angles, candidates.force, candidates.place_index
     )
     _check_sensitivity(rows, owners)
     workspace = candidates.select(stream.permutation(count)[:_WORKSPACE])

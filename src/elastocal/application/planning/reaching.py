@@ -142,7 +142,7 @@ def find_outward_direction(chain: Chain, point: MeasuringPoint) -> np.ndarray:
 
 
 def reach_places(
-    setup: SetUp, robot: Robot, angles: np.ndarray, place: np.ndarray
+    setup: SetUp, robot: Robot, angles: np.ndarray, place_index: np.ndarray
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Move configurations to where the kind can measure.
 
@@ -150,7 +150,7 @@ def reach_places(
     ----------
     setup, robot : what measures the robot.
     angles : (N, n) angles of the chain, rad.
-    place : (N,) int, index of the place of each configuration.
+    place_index : (N,) int, index of the place of each configuration.
 
     Returns
     -------
@@ -161,7 +161,7 @@ def reach_places(
     names = list(setup.places)
     checks: dict[str, np.ndarray] = {}
     for index, name in enumerate(names):
-        members = np.flatnonzero(place == index)
+        members = np.flatnonzero(place_index == index)
         of_place = _reach_place(setup, robot, angles[members], setup.places[name])
         moved[members] = of_place[0]
         for constraint, is_met in of_place[1].items():

@@ -102,10 +102,12 @@ def _name_features(survey: Survey, plan: Plan) -> list[str]:
     setup = survey.setup
     if setup is None or not setup.has_features:
         return []
-    assert plan.fitted.place is not None
-    assert plan.held_out.place is not None
+    assert plan.fitted.place_index is not None
+    assert plan.held_out.place_index is not None
     names = list(setup.places)
-    indices = np.concatenate([plan.fitted.place, plan.held_out.place]).tolist()
+    indices = np.concatenate(
+        [plan.fitted.place_index, plan.held_out.place_index]
+    ).tolist()
     return [names[index] for index in indices]
 
 

@@ -220,7 +220,7 @@ def compute_information_rows(
     survey: Survey,
     reported_angles: np.ndarray,
     force: np.ndarray,
-    place: np.ndarray | None = None,
+    place_index: np.ndarray | None = None,
 ) -> np.ndarray:
     """Compute the whitened sensitivities of the measurements in each configuration.
 
@@ -229,7 +229,7 @@ def compute_information_rows(
     survey : what is measured.
     reported_angles : (N, n) joint angles as the controller reports them, rad.
     force : (N, 3) full load at the last measuring point, N, base axes.
-    place : (N,) int, place of the set-up that is measured; None for a tracker.
+    place_index : (N,) int, place of the set-up that is measured; None for a tracker.
 
     Returns
     -------
@@ -249,7 +249,7 @@ def compute_information_rows(
             survey,
             reported_angles[chunk],
             force[chunk],
-            None if place is None else place[chunk],
+            None if place_index is None else place_index[chunk],
         )
         around = evaluate_conditions(model, estimate, observations.states)
         linearization = linearize(model, estimate, observations, around)
@@ -336,7 +336,7 @@ def build_observations(
     survey: Survey,
     reported_angles: np.ndarray,
     force: np.ndarray,
-    place: np.ndarray | None = None,
+    place_index: np.ndarray | None = None,
 ) -> Observations:
     """Build observations without measured values: every target under every share of the
     load of each configuration, in this order.
@@ -353,7 +353,7 @@ def build_observations(
     if survey.setup is not None:
         # A channel is one place, because all rows have the numbers of one kind.
         if survey.setup.has_features:
-            channel = place
+            channel = place_index
         else:
             position, rotation, _ = survey.setup.locate_targets(
                 survey.robot, states.joint_angles
