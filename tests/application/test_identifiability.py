@@ -62,7 +62,9 @@ def test_unknown_sockets_hide_the_base_and_all_lengths(tmp_path, rows):
     assert any(
         "where the base stands and how it is turned" in text for text in sentences
     )
-    assert all(text.startswith("these measurements cannot see") for text in sentences)
+    assert all(
+        text.startswith("these measurements do not determine") for text in sentences
+    )
 
 
 def test_sockets_that_are_known_in_the_base_show_where_it_stands(tmp_path, rows):

@@ -139,13 +139,13 @@ def test_the_sentence_says_whether_the_offset_of_the_tool_is_in_it(plan):
     answer, _, _ = plan()
     text = " ".join(answer.split())
     assert "of its base and of a constant offset at the end effector)" in text
-    assert "The offset of the tool is not in it" in text
+    assert "It does not include the offset of the tool" in text
 
 
 def test_a_stated_offset_of_the_tool_is_in_the_error(plan):
     text = " ".join(plan("--target", "6DoF=0,0,0.1")[0].split())
     assert "(after the best placement of its base): " in text
-    assert "The offset of the tool is in it" in text
+    assert "It includes the offset of the tool" in text
 
 
 def test_plan_wants_as_many_poses_as_check_does(plan, elastocal, tmp_path):

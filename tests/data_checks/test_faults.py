@@ -244,7 +244,7 @@ def test_positions_of_the_files_own_kinematics_are_said_to_be_no_measurements(
     (sentence,) = warn_of_computed_positions(
         replace_measured_columns(campaign, joint_angles=angles, position=position)
     )
-    assert "no measurements" in sentence and "own kinematics" in sentence
+    assert "not measurements" in sentence and "the kinematics" in sentence
     measured = position + 6e-5 * np.random.default_rng(1).standard_normal(
         position.shape
     )

@@ -367,7 +367,7 @@ def test_simple_hypotheses_come_first_and_none_is_listed_twice(fanuc):
     assert len(set(details)) == len(details)
     assert [hypothesis.detail for hypothesis in list_fitted_hypotheses(campaign)] == [
         "the base stands elsewhere",
-        "targets are turned otherwise",
+        "targets have another orientation",
         "targets sit elsewhere",
     ]
     for hypothesis in single:

@@ -150,7 +150,7 @@ def test_equal_models_gain_nothing(kuka):
     (sentence,) = describe_missing_gain(
         (declared, declared), campaign.observations, STRONG, SETTINGS
     )
-    assert "not expected to predict new poses better" in sentence
+    assert "not expected to improve predictions of new poses" in sentence
 
 
 def test_a_model_with_enough_measurements_is_not_compared_with_frames_alone(

@@ -187,7 +187,7 @@ def test_a_sign_against_physics_causes_a_warning(fitted):
     negative = replace_first_parameter(fitted, "joint_tilt@2", -1e-7, 1e-8)
     (warning,) = list_warnings(negative)
     assert warning.startswith("joint_tilt@2: tilt_about_")
-    assert "by its physics positive" in warning
+    assert "physics requires it to be positive" in warning
 
 
 def test_a_size_beyond_the_reach_of_an_effect_causes_a_warning(fitted):
@@ -197,7 +197,7 @@ def test_a_size_beyond_the_reach_of_an_effect_causes_a_warning(fitted):
         large = replace_first_parameter(fitted, key, size, 0.1 * plausible)
         (warning,) = list_warnings(large)
         assert warning.startswith("joint_offset@3: offset is")
-        assert "3 times what such an effect reaches" in warning
+        assert "3 times the reference size of such an effect" in warning
         oversized = find_oversized_effects(large, {"joint_offset", "payload"})
         assert oversized == {"joint_offset"}
         assert not find_oversized_effects(large, {"payload"})

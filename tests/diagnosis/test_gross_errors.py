@@ -90,6 +90,6 @@ def test_rows_that_stay_far_from_the_model_are_described_from_two_poses_on(cases
     pose = campaign.measurements.pose
     first, second = np.unique(pose)[:2]
     (sentence,) = describe_standing_out(np.isin(pose, [first, second]), campaign)
-    assert "of 2 poses are far from the model and stay" in sentence
+    assert "of 2 poses are far from the model and are kept" in sentence
     assert not describe_standing_out(pose == first, campaign)
     assert describe_standing_out(pose == first, campaign, least_poses=1)

@@ -36,9 +36,9 @@ def test_the_table_states_what_was_read_and_what_is_testable(
     )
     assert any(" not testable: " in text for _, text in overview.rows)
     assert 1.0 < float(rows["noise"].split(" ")[0]) < 1000.0
-    assert find_sentences(overview, "one load beside none") and find_sentences(
-        overview, "held-out poses say little"
-    )
+    assert find_sentences(
+        overview, "only one load besides the unloaded state"
+    ) and find_sentences(overview, "held-out poses determine the error poorly")
     assert not find_sentences(overview, "poses are few")
 
 

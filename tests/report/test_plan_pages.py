@@ -45,10 +45,10 @@ def test_a_row_has_the_angles_in_degrees_and_as_many_boxes_as_measurements():
     # The sheet states where the reflector has to sit, because no later error shows it.
     with_offset = replace(survey, targets=(Target("T", "tool0", (0.1, 0.0, 0.05)),))
     assert (
-        "T on tool0, at (100.00, 0.00, 50.00) mm of it"
+        "T on point tool0, at the offset (100.00, 0.00, 50.00) mm"
         in collect_plan_facts(with_offset, plan, rows, ["worth"])["targets"][0]
     )
-    assert "an offset that is fitted" in facts["targets"][0]
+    assert "an unknown offset, which is fitted" in facts["targets"][0]
 
 
 def test_the_sheet_is_typeset(tmp_path):

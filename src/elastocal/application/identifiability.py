@@ -153,7 +153,7 @@ def describe_unseen_errors(unseen: list[Unseen]) -> list[str]:
         cure = f"{remedy} would show it"
         if not remedy:
             cure = "no further contact of this target shows it"
-        sentences.append(f"these measurements cannot see {listed}: {cure}")
+        sentences.append(f"these measurements do not determine {listed}: {cure}")
     return sentences
 
 

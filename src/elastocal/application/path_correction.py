@@ -186,7 +186,7 @@ def correct_path(
             source,
             "",
             _describe_large_steps(calibrated.robot, wanted, large_steps, 1),
-            "targets between, another posture, or --allow-large-steps",
+            "intermediate targets, another posture, or --allow-large-steps",
         )
     outside, overloaded = find_extrapolated(calibrated, commands, wrench)
     _, without_bound = find_extrapolated(
@@ -349,7 +349,7 @@ def describe_regression(path: CorrectedPath, regression: str) -> str:
         rms = root_mean_square(lengths_m[lengths_m > 0.0])
         size = f"{format_millimetres(rms)} RMS"
     return (
-        f"a {regression} on what the model leaves corrects"
+        f"a {regression} on the residuals of the model corrects"
         f" {format_integer((lengths_m > 0.0).sum())} of {path.count} by {size}"
     )
 
@@ -365,8 +365,9 @@ def describe_path_warnings(path: CorrectedPath) -> list[str]:
     after_rad = root_mean_square(path.prediction.orientation_rad)
     if after_rad > before_rad:
         warnings.append(
-            "the corrected orientations are less certain than the uncorrected ones are"
-            " wrong: measure orientations, or several reflectors off one line"
+            "the uncertainty of the corrected orientations exceeds their error without"
+            " the correction: measure orientations, or several reflectors that are not on"
+            " one line"
         )
     if path.large_steps:
         robot = path.calibrated.robot

@@ -43,7 +43,7 @@ def warn_of_few_poses(
     orientations = ", or orientations too" if set(kinds) == {POSITION.name} else ""
     return [
         f"{poses} poses are few for {parameters} parameters, of which they determine "
-        f"about {effective:.0f}, by {numbers} numbers: other poses will be off by more "
-        f"than these. Measure about {needed_poses} poses to fit{orientations}, or declare "
+        f"about {effective:.0f}, by {numbers} numbers: errors at other poses will be larger "
+        f"than at these. Measure about {needed_poses} poses to fit{orientations}, or declare "
         "fewer errors"
     ]

@@ -270,9 +270,9 @@ def parse_targets(
     targets = []
     for name, target in described.items():
         if not isinstance(name, str):
-            finding = f"the name {name!r}, which YAML takes for no text"
+            finding = f"the name {name!r}, which YAML does not read as text"
             raise InputError(
-                source, "targets", finding, "a name, in quotes where need be"
+                source, "targets", finding, "a name, in quotes if necessary"
             )
         point = target["point"]
         if point not in points:

@@ -609,7 +609,7 @@ def find_user_campaign(
     earlier_path = _folder_of_results(Path(results, name))
     if earlier_path is not None and not earlier_path.samefile(path):
         finding = f"{name!r}, whose results are of {earlier_path.as_posix()}"
-        allowed = f"another name, or first take away {Path(results, name).as_posix()}"
+        allowed = f"another name, or first delete {Path(results, name).as_posix()}"
         raise InputError(folder.source, "campaign", finding, allowed)
     return {name: folder}
 

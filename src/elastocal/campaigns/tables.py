@@ -110,9 +110,8 @@ class Dialect:
 
 _UNSTATED = Dialect()
 _HEADER_ALLOWED = (
-    "columns x, y, z or such; --header LINE and --column x=NAME say which line and "
-    "which columns they are, --columns q1,q2,… what the columns of a table without a "
-    "header are"
+    "columns such as x, y, z; --header LINE states the line of their names, --column "
+    "x=NAME another name, and --columns q1,q2,… the columns of a table without a header"
 )
 
 

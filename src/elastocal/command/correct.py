@@ -141,8 +141,8 @@ def correct(
     details = describe_path_accuracy(corrected)
     if details and not campaign.measures_poses:
         details.append(
-            "orientations were not measured: a turn of the tool that positions do not"
-            " show is not in their error"
+            "orientations were not measured: their error does not include rotations of"
+            " the tool that positions do not show"
         )
     remainder = campaign.verdict.remainder
     if remainder and campaign.calibrated.residual_model:

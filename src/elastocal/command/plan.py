@@ -384,8 +384,8 @@ def _describe_plan(survey: Survey, chosen: Plan, sensor: Sensor) -> list[str]:
         f" {frame}: {format_millimetres(chosen.accuracy_m[-1])} RMS over configurations"
         " that the cell allows; with as many random poses"
         f" {median:.3f} mm ({low:.3f} to {high:.3f}). {_describe_tool(survey)}",
-        "It is a standard error by the uncertainty of the parameters alone,"
-        f" without the noise of {'the tracker' if survey.setup is None else 'the measurement'}.",
+        "It includes the uncertainty of the parameters only, not the noise of"
+        f" {'the tracker' if survey.setup is None else 'the measurement'}.",
         f"Assumed noise: {noise}{source}.",
     ]
 
@@ -413,10 +413,13 @@ def _describe_tool(survey: Survey) -> str:
     """Say whether the error contains that of the tool's offset."""
     if survey.offset_removed:
         return (
-            "The offset of the tool is not in it, because that of the"
-            f" {'reflector' if survey.setup is None else 'target'} is fitted in its place."
+            "It does not include the offset of the tool, because that of the"
+            f" {'reflector' if survey.setup is None else 'target'} is fitted instead."
         )
-    return "The offset of the tool is in it, known as well as that of the reflectors."
+    return (
+        "It includes the offset of the tool, with the uncertainty of the reflectors'"
+        " offsets."
+    )
 
 
 def _find_places(survey: Survey) -> Mapping[str, np.ndarray]:

@@ -62,9 +62,9 @@ _MAX_USUAL_RATIO = 25.0
 # Standard errors by which a compliance is far off.
 _NEGATIVE_STD_ERRORS = 2.0
 _RIGID = (
-    "the robot file states no joint compliances: the joints are taken as rigid, and do"
-    " not yield to the weights that it may state; load the robot and set compliance to"
-    " identify, or state them"
+    "the robot file states no joint compliances, so the joints are taken as rigid, and"
+    " declared weights do not deflect them; measure under loads with compliance:"
+    " identify, or state compliances"
 )
 # No robot follows its nominal kinematics this closely: a tenth of the errors of good
 # robots. Rounding of angles to 0.001° causes less.
@@ -336,8 +336,8 @@ def _report_wrong_loads(
     faults = []
     if best.sign < 0:
         detail = (
-            "the loads fit turned round, as if they were written as what the robot does"
-            " to its surroundings"
+            "the loads fit with the opposite sign, as if they were the forces of the robot"
+            " on its surroundings"
         )
         faults.append(Fault("wrong_sign", (), detail, (ratio,), evidence))
     if best.detail:
@@ -388,8 +388,8 @@ def find_implausible_measurements(campaign: Campaign) -> list[Fault]:
         misfit = f"positions lie {distance:.2g} m"
     detail = (
         f"{misfit} (RMS) from where the robot file puts them, and no other sense, unit,"
-        " axis, frame or order of rows that was tried mends it: chain, zeros of the"
-        " joints, measuring points and columns need a look"
+        " axis, frame or order of rows explains it: check the chain, the zeros of the"
+        " joints, the measuring points and the columns"
     )
     parameters = (
         Value("RMS distance of positions", distance, "m"),
@@ -435,8 +435,8 @@ def warn_of_compliances(fitted: Fit) -> list[str]:
     if not joints:
         return []
     return [
-        f"joint compliances beyond what robots have, in µrad/(N·m): {', '.join(joints)}; "
-        "check the sign and the unit of the loads, and whether something else yields too"
+        f"implausible joint compliances, in µrad/(N·m): {', '.join(joints)}; check the "
+        "sign and the unit of the loads, and whether another part is elastic too"
     ]
 
 
@@ -448,7 +448,7 @@ def warn_of_computed_positions(campaign: Campaign) -> list[str]:
     if rms_m > _MIN_ROBOT_ERROR_M:
         return []
     return [
-        f"positions are those of the robot file's own kinematics to {1e6 * rms_m:.2g} µm,"
-        " nearer than any robot goes: a controller worked them out of the joint angles;"
-        " they are no measurements, and show nothing of the robot"
+        "positions agree with the kinematics of the robot file to"
+        f" {1e6 * rms_m:.2g} µm, better than any robot does: a controller computed them from"
+        " the joint angles; they are not measurements, and show nothing of the robot"
     ]

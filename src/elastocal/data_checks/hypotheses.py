@@ -255,7 +255,7 @@ def list_fitted_hypotheses(campaign: Campaign) -> list[Hypothesis]:
     unknown: dict[str, dict[str, Any]] = {}
     has_rotation = any(target.rotation is not None for target in targets)
     if campaign.measures_poses and has_rotation:
-        unknown["targets are turned otherwise"] = {"rotation": None}
+        unknown["targets have another orientation"] = {"rotation": None}
     if any(target.offset_m is not None for target in targets):
         unknown["targets sit elsewhere"] = {"offset_m": None, "rotation": None}
     for detail, fields in unknown.items():
@@ -366,8 +366,8 @@ def _describe_targets(written: Placement, placement: Placement) -> str | None:
     remedy = " and ".join(f"{key}: unknown" for key in wrong)
     return (
         f"targets do not sit where the campaign says: {' and '.join(wrong.values())};"
-        f" where its mount is not as stated, {remedy} in campaign.yaml fits it, and known"
-        " values may stand there"
+        f" if the mount differs from the stated one, write {remedy} in campaign.yaml to"
+        " fit it, or its known values"
     )
 
 
@@ -458,8 +458,8 @@ def _list_lengths(campaign: Campaign) -> Iterator[Hypothesis]:
 
 def _list_rotations() -> Iterator[Hypothesis]:
     detail = (
-        "the rotation vectors fit turned round, as if they took base axes into the"
-        " target's"
+        "the rotation vectors fit inverted, as if they rotated base axes into those of"
+        " the target"
     )
     read = transform_columns(rotation_vector=np.negative)
     yield Hypothesis("wrong_sign", detail, read)

@@ -66,7 +66,7 @@ if TYPE_CHECKING:
 _DEVIATIONS = np.linspace(-6.0, 6.0, 1201)
 _DENSITIES = np.exp(-0.5 * _DEVIATIONS**2)
 TOO_UNCERTAIN = (
-    "what was found is too uncertain to make predictions better:"
+    "the effects found are too uncertain to improve predictions:"
     " the model stays as declared"
 )
 
@@ -156,10 +156,11 @@ def describe_missing_gain(
         for values in left_out
     )
     return [
-        "what was found is not expected to predict new poses better: if"
+        "the effects found are not expected to improve predictions of new poses: if"
         f" {group.max() + 1} groups of neighbouring training poses are left out in turn,"
-        f" positions are off by {after_mm:.3g} mm RMS with it and by {before_mm:.3g} mm"
-        " without, and the evidence does not outweigh that: the model stays as declared"
+        f" their RMS position error is {after_mm:.3g} mm with the effects and"
+        f" {before_mm:.3g} mm without, and the evidence does not outweigh this: the model"
+        " stays as declared"
     ]
 
 
@@ -269,8 +270,8 @@ def describe_losses(
             rms_mm = 1e3 * np.sqrt(squares.mean())
             frames_rms_mm = 1e3 * np.sqrt(frames_squares.mean())
             sentences[-1] = (
-                f"training poses left out in turn are off by {rms_mm:.2f} mm RMS by the"
-                f" {name}, by {frames_rms_mm:.2f} mm with frames and targets alone:"
+                f"training poses left out in turn have an RMS error of {rms_mm:.2f} mm by the"
+                f" {name} and of {frames_rms_mm:.2f} mm with frames and targets alone:"
                 f" {len(squares)} poses are too few for {effective:.0f} parameters, and"
                 f" the {name} is not kept"
             )

@@ -297,7 +297,7 @@ class CandidateDesign:
                 "campaign",
                 "targets",
                 "measurements that no joint moves",
-                "targets on what moves, off a lone axis",
+                "targets on a moving link, away from the axis of a single joint",
             )
         return 1.0 / np.sqrt(information)
 

@@ -339,10 +339,12 @@ def warn_of_implausible_values(fitted: Fit, keys: Sequence[str]) -> list[str]:
             estimate = f"{key}: {parameter.name} is {size} {parameter.unit}"
             if parameter.sign * value < -_STD_ERRORS * std_error:
                 sign = "positive" if parameter.sign > 0 else "negative"
-                warnings.append(f"{estimate}, and by its physics {sign}")
+                warnings.append(
+                    f"{estimate}, although physics requires it to be {sign}"
+                )
             if _is_oversized(value, std_error, parameter):
                 warnings.append(
                     f"{estimate}, more than {_IMPLAUSIBLE_FACTOR:g} times "
-                    "what such an effect reaches"
+                    "the reference size of such an effect"
                 )
     return warnings

@@ -57,7 +57,7 @@ def _warn_of_pose_error(model: ScoredModel, evidence: Evidence) -> Iterator[str]
     if model.pose_error_rad > (1.0 - _SAME) * largest_rad:
         yield (
             "the error that the measurements of a pose share is estimated at the end of"
-            f" its grid, {1e6 * largest_rad:.0f} µrad: what exceeds it may be taken for"
+            f" its grid, {1e6 * largest_rad:.0f} µrad: a larger error may be mistaken for"
             " an effect"
         )
 
@@ -74,8 +74,8 @@ def _warn_of_geometry(final: Fit) -> Iterator[str]:
         ):
             yield (
                 "the usual size of the errors of the declared geometry is estimated at"
-                f" the end of its grid, {PRIOR_SCALES[-1]:g} times what robots are made"
-                " to: compare the robot file with the robot"
+                f" the end of its grid, {PRIOR_SCALES[-1]:g} times the manufacturing"
+                " tolerance: compare the robot file with the robot"
             )
 
 
@@ -90,7 +90,7 @@ def _warn_of_sizes(model: ScoredModel, evidence: Evidence) -> Iterator[str]:
         if term.candidate and is_last and np.sqrt((values**2).mean()) > largest:
             yield (
                 f"{term.candidate.key}: its size is estimated at the end of its grid,"
-                f" {largest:g} times what such an effect reaches"
+                f" {largest:g} × the reference size of such effects"
             )
 
 
@@ -102,5 +102,5 @@ def _warn_of_shapes(final: Fit) -> Iterator[str]:
             if not shape.lowest + margin < value < shape.highest - margin:
                 yield (
                     f"{effect.key}: its {shape.name} is estimated at the end of its"
-                    f" range, {value:.3g} {shape.unit}: its law may be another one"
+                    f" range, {value:.3g} {shape.unit}: its law may be different"
                 )

@@ -325,9 +325,9 @@ def describe_standing_out(
         return []
     rows = format_count(int(standing_out.sum()), "row")
     return [
-        f"{rows} of {format_count(poses, 'pose')} are far from the model and stay: an"
-        " effect that acts there is more probable than so many accidents, and the model"
-        " lacks it"
+        f"{rows} of {format_count(poses, 'pose')} are far from the model and are kept:"
+        " an effect that acts there, and that the model lacks, is more probable than so"
+        " many gross errors"
     ]
 
 

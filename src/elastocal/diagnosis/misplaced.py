@@ -346,7 +346,7 @@ def _describe_frame(
         end = campaign.robot.chain.end_effector.name
         text = (
             f"reflector or tool sits {length} from where it is declared, {direction} of {end}: "
-            "the flange is not certified, the reflector is"
+            "results hold for the reflector, not for the flange"
         )
     elif frame == BASE:
         text = f"the base stands {length} from where it is declared, {direction} of the base"
@@ -360,4 +360,4 @@ def _describe_frame(
     if alternatives:
         names = " or ".join(alternatives)
         text += f" (or it is {names}: these measurements do not distinguish them)"
-    return f"{text}. It is {sizes:.0f} times what such a length is usually off"
+    return f"{text}. It is {sizes:.0f} times the usual error of such a length"

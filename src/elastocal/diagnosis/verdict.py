@@ -595,9 +595,8 @@ def warn_of_excess_scatter(
         return []
     (sentence,) = warn_of_scatter(scatter, measured, 0.0)
     return [
-        f"{sentence}, over {freedom:.0f} numbers, which chance makes in less than"
-        f" {100 * level:g} % of campaigns: what exceeds that noise repeats, and counts as"
-        " an error of the model"
+        f"{sentence}, over {freedom:.0f} numbers; by chance alone this happens in less"
+        f" than {100 * level:g} % of campaigns: the excess counts as an error of the model"
     ]
 
 
@@ -631,6 +630,6 @@ def warn_of_pose_error(residual_noise: Noise, least_rad: float) -> list[str]:
         return []
     return [
         "errors within a pose are correlated, as if each joint were "
-        f"{1e6 * residual_noise.pose_rad:.0f} µrad off, which repeats of a pose do not "
-        "show: new poses will have errors of this size"
+        f"{1e6 * residual_noise.pose_rad:.0f} µrad off; repeats of a pose do not show "
+        "this error, so new poses will have errors of this size"
     ]

@@ -183,7 +183,7 @@ def choose_noise(
     declared = _read_declared_noise(campaign)
     if repeats is None and declared is None:
         return None, [
-            "no repeats and no declared noise: nothing says how large the residual may be"
+            "no repeats and no declared noise: the expected size of the residual is unknown"
         ]
     if repeats is None or declared is None:
         return repeats or declared, []

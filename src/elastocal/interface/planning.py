@@ -64,7 +64,7 @@ class MeasurementPlan:
     def __repr__(self) -> str:
         return (
             f"<MeasurementPlan: {len(self.joint_angles)} poses to fit and"
-            f" {len(self.held_out_angles)} to validate; the parameters will leave"
+            f" {len(self.held_out_angles)} to validate; predicted position error"
             f" {1e3 * self.predicted_error_m:.3f} mm RMS>"
         )
 

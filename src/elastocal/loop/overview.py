@@ -306,21 +306,21 @@ def _list_shortcomings(
     states = case.observations.states
     if states.repeats.max() == 1:
         shortcomings.append(
-            "no pose is repeated: the noise is what the campaign declares, "
-            "or what the model leaves"
+            "no pose is repeated: the noise is the declared one, "
+            "or the residual of the model"
         )
     validation_poses = _count_poses(held_out)
     if validation_poses < FEWEST_HELD_OUT:
         shortcomings.append(
-            f"{validation_poses} held-out poses say little of the error: "
-            f"{FEWEST_HELD_OUT} or more would"
+            f"{validation_poses} held-out poses determine the error poorly: "
+            f"use {FEWEST_HELD_OUT} or more"
         )
     forces = states.wrench[states.wrench.any(axis=1), :3]
     # A single force has a single singular value.
     largest, second = [*np.linalg.svd(forces, compute_uv=False), 0.0, 0.0][:2]
     if len(forces) and second < _COLLINEAR_SHARE * largest:
         shortcomings.append(
-            "all loads pull along one line: compliances across it are not shown"
+            "all loads act along one line: they do not show compliances across it"
         )
     if not len(forces) and case.campaign.compliance == "identify":
         shortcomings.append(
@@ -328,7 +328,8 @@ def _list_shortcomings(
         )
     if len(np.unique(states.load)) == 2:
         shortcomings.append(
-            "one load beside none: what is not linear in the load cannot be distinguished"
+            "only one load besides the unloaded state: effects that are nonlinear in the "
+            "load cannot be distinguished"
         )
     return shortcomings
 

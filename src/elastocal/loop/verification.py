@@ -335,7 +335,7 @@ def _remark_on_frame(
         return []
     return [
         f"after the best placement of the base {1e3 * placed_m:.3f} mm of the measured"
-        f" {1e3 * rms_m:.3f} mm are left: the tracker's frame is not that of the campaign,"
+        f" {1e3 * rms_m:.3f} mm remain: the tracker's frame is not that of the campaign,"
         " or the diagnosis has placed the base inexactly"
     ]
 

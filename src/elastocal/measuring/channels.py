@@ -161,7 +161,7 @@ def _parse_features(
     features = []
     for name, keys in described.items():
         if not isinstance(name, str):
-            allowed = "a name, in quotes where need be"
+            allowed = "a name, in quotes if necessary"
             raise InputError(source, _KEY, f"the name {name!r}", allowed)
         stated = {key: value for key, value in keys.items() if key != "kind"}
         kind = keys.get("kind", with_features[0].name if len(by_name) == 1 else "")

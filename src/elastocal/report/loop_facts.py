@@ -37,12 +37,12 @@ TITLES = {
     "named": "one mechanism is missing in the declared model",
     "class": "one mechanism is missing in the declared model; which one is ambiguous",
     "several": "several mechanisms are missing in the declared model",
-    "unexplained": "something is missing in the declared model that the catalogue does not have",
+    "unexplained": "the declared model lacks something that is not in the catalogue",
     "not_testable": "these measurements can test no mechanism",
 }
 AT_FAULT = "the data are at fault"
 # Appended to a title if a part of the residual is a function of the joints.
-AND_MORE = "; more is missing that has no name"
+AND_MORE = "; a further error has no known cause"
 # Sections of the template that are lists of sentences; the others are one paragraph.
 _LISTS = (
     "sentences",

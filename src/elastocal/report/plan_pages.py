@@ -134,6 +134,6 @@ def _describe_target(target: Target) -> str:
     The reflector has to sit there; otherwise the robot is corrected for another point.
     """
     if not target.offset_m:
-        return f"{target.name} on {target.point}, at an offset that is fitted"
+        return f"{target.name} on point {target.point}, at an unknown offset, which is fitted"
     offset = ", ".join(f"{1e3 * value:.2f}" for value in target.offset_m)
-    return f"{target.name} on {target.point}, at ({offset}) mm of it"
+    return f"{target.name} on point {target.point}, at the offset ({offset}) mm"

@@ -261,7 +261,7 @@ def _check_sensitivity(rows: np.ndarray, owners: list[str]) -> None:
             "plan",
             "targets",
             "targets that no joint moves",
-            "a --target on what moves, off a lone axis",
+            "a --target on a moving link, away from the axis of a single joint",
         )
 
 
