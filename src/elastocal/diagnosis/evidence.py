@@ -301,9 +301,10 @@ def _condition_on_model(
     columns, deviations = scaled_columns
     factor = np.linalg.cholesky(_scaled_precision(statistics, columns, deviations))
     # Rows of the Gram matrix and of the score, divided by the factor.
-    right = deviations[:, None] * np.concatenate(
+    right = np.concatenate(
         [statistics.gram_rows(columns), statistics.score[:, columns, None]], axis=2
     )
+    right *= deviations[:, None]
     if len(columns):
         for lower, rows in zip(factor, right, strict=True):
             # The transposes have the column order that BLAS expects, so that it solves

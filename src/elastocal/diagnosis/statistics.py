@@ -374,7 +374,8 @@ class SufficientStatistics:
 
     def gram_rows(self, columns: np.ndarray) -> np.ndarray:
         """Rows (T, D, K) of W'MW of some columns (D,)."""
-        gram = self.gram.take(columns, axis=1)
+        # `take` would copy the whole matrix first, because it is not contiguous.
+        gram = self.gram[:, columns]
         if not self.low_rank.shape[2]:
             return gram
         low_rank = self.low_rank[:, columns]
