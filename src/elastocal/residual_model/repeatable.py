@@ -31,6 +31,7 @@ from itertools import combinations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from elastocal.campaigns.holdout import SAME_POSE_RAD, number_configurations
 from elastocal.fitting.least_squares import INTERMEDIATE_TOLERANCE, fit_model
@@ -165,8 +166,8 @@ class _BasisProducts:
         """
         configuration = self.configuration[block]
         functions = weight * self.basis(inputs)
-        products = (functions * weight * residual[:, :, None]).sum(axis=1)
-        np.add.at(self.residual, configuration, products)
+        products = (weight[:, :, 0] * residual)[:, None] @ functions
+        _add_by_group(self.residual, configuration, products[:, 0])
         for number in range(_GROUPS):
             members = self.group[configuration] == number
             rows = functions[members].reshape(-1, functions.shape[2])
@@ -321,6 +322,17 @@ def _start_products(
     )
 
 
+def _add_by_group(sums: np.ndarray, group: np.ndarray, values: np.ndarray) -> None:
+    """Add values (M, D) of groups (M,) to sums (G, D). numpy's `add.at` takes five times
+    as long."""
+    present, index = np.unique(group, return_inverse=True)
+    members = csr_array(
+        (np.ones(len(group)), (index, np.arange(len(group)))),
+        (len(present), len(group)),
+    )
+    sums[present] += members @ values
+
+
 def _compute_leverage(sensitivities: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     """Mean leverage of the rows of each observation, (M,) array, from its whitened
     sensitivities (M, rows, P)."""
@@ -396,45 +408,54 @@ def _cross_validate(
     projections = np.stack(
         [_project_residuals(products, chance, number) for number in range(_GROUPS)]
     )
-    left_out_folds = [
-        _rotate_to_principal_axes(products.gram, projections, fold == number)
-        for fold in partitions
-        for number in range(_FOLDS)
-    ]
-    for penalty in _PENALTIES:
-        with_residual, square = np.zeros((2, 1 + _DRAWS))
-        coefficients = []
-        for of_fold in left_out_folds:
-            eigenvalues = of_fold.eigenvalues
-            shrunk = of_fold.training / (eigenvalues + penalty * of_fold.mean)
-            with_residual += (of_fold.left_out * shrunk).sum(axis=1)
-            square += (eigenvalues * shrunk**2).sum(axis=1)
-            coefficients.append(of_fold.axes @ shrunk[0])
-        scores = with_residual / np.sqrt(square)
-        by_fold = np.reshape(coefficients, (len(partitions), _FOLDS, -1))
-        yield _CrossValidatedModel(products, scores, partitions, by_fold)
+    with_residual, square = np.zeros((2, len(_PENALTIES), 1 + _DRAWS))
+    coefficients = []
+    for fold in partitions:
+        for of_fold in _leave_out_folds(products.gram, projections, fold):
+            ridge = of_fold.mean * np.array(_PENALTIES)[:, None]
+            inverse = 1.0 / (of_fold.eigenvalues + ridge)
+            with_residual += inverse @ (of_fold.left_out * of_fold.training).T
+            square += (of_fold.eigenvalues * inverse**2) @ (of_fold.training**2).T
+            coefficients.append((of_fold.training[0] * inverse) @ of_fold.axes.T)
+    scores = with_residual / np.sqrt(square)
+    shape = (len(partitions), _FOLDS, len(_PENALTIES), -1)
+    by_penalty = np.moveaxis(np.reshape(coefficients, shape), 2, 0)
+    for of_penalty, by_fold in zip(scores, by_penalty, strict=True):
+        yield _CrossValidatedModel(products, of_penalty, partitions, by_fold)
 
 
-def _rotate_to_principal_axes(
-    gram: np.ndarray, projections: np.ndarray, is_left_out: np.ndarray
-) -> _LeftOutFold:
-    """Leave out a fold, and express its and the other measurements' products along the
-    principal axes of the other ones.
+def _leave_out_folds(
+    gram: np.ndarray, projections: np.ndarray, fold: np.ndarray
+) -> Iterator[_LeftOutFold]:
+    """Leave out each fold of a partition, and express its and the other measurements'
+    products along the principal axes of the other ones.
 
     Parameters
     ----------
     gram : (C, D, D) array, Gram matrix of each group
     projections : (C, 1 + N, D) array, products of each group with the residuals
-    is_left_out : (C,) bool array, groups of the fold
+    fold : (C,) int array, fold of each group
     """
-    eigenvalues, axes = np.linalg.eigh(gram[~is_left_out].sum(axis=0))
-    return _LeftOutFold(
-        np.maximum(eigenvalues, 0.0),
-        float(eigenvalues.mean()),
-        axes,
-        projections[~is_left_out].sum(axis=0) @ axes,
-        projections[is_left_out].sum(axis=0) @ axes,
-    )
+    is_left_out = fold == np.arange(_FOLDS)[:, None]
+    training_grams = _sum_groups(~is_left_out, gram)
+    training = _sum_groups(~is_left_out, projections)
+    left_out = _sum_groups(is_left_out, projections)
+    for number in range(_FOLDS):
+        eigenvalues, axes = np.linalg.eigh(training_grams[number])
+        yield _LeftOutFold(
+            np.maximum(eigenvalues, 0.0),
+            float(eigenvalues.mean()),
+            axes,
+            training[number] @ axes,
+            left_out[number] @ axes,
+        )
+
+
+def _sum_groups(chosen: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Sum values (C, ...) over the groups that are chosen by the rows of (K, C) bool:
+    (K, ...), as one product of two matrices."""
+    sums = chosen.astype(float) @ values.reshape(len(values), -1)
+    return sums.reshape(len(chosen), *values.shape[1:])
 
 
 def _project_residuals(
