@@ -36,6 +36,7 @@ from elastocal.fitting.model import (
 )
 from elastocal.fitting.observations import Observations, States, select_states
 from elastocal.mechanics.kinematics import compute_pose_differences, compute_poses
+from elastocal.residual_model.regressions import list_regressions
 from elastocal.residual_model.selection import (
     build_inputs,
     find_beyond_regression,
@@ -81,6 +82,14 @@ class ResidualModel:
     sensor_m: float
     typical: float
     choice: RegressionChoice | None = None
+
+    @property
+    def uses_jacobian(self) -> bool:
+        """Whether the regression needs the Jacobian among its inputs. An unknown one
+        may."""
+        name = "" if self.choice is None else self.choice.regression
+        regression = list_regressions().get(name)
+        return regression is None or regression.uses_jacobian
 
 
 @dataclass(frozen=True)
@@ -320,7 +329,10 @@ def select_regression_inputs(
         calibrated.states, observations.states.joint_angles, wrench
     )
     inputs = build_inputs(
-        calibrated.model, calibrated.estimate, select_states(observations, active)
+        calibrated.model,
+        calibrated.estimate,
+        select_states(observations, active),
+        with_jacobian=residual_model.uses_jacobian,
     )
     offset_m = np.broadcast_to(residual_model.target_offset_m, (len(inputs), 3))
     covariates = np.hstack([inputs.covariates[:, :-3], offset_m])

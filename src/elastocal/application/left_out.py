@@ -17,6 +17,7 @@ from scipy.linalg import hadamard
 from elastocal.application.calibrated import (
     build_observations,
     move_to_end_effector,
+    split_into_chunks,
     zero_coefficients,
 )
 from elastocal.application.frames import PLACEMENT_PARAMETERS, compute_placement_columns
@@ -32,6 +33,7 @@ from elastocal.residual_model.selection import is_commanded
 
 if TYPE_CHECKING:
     from elastocal.application.frames import Scope
+    from elastocal.effects.conditions import Conditions
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.observations import States
@@ -90,26 +92,36 @@ class LeftOutEffects:
         then those by a standard deviation along each axis of their uncertainty, m and
         rad, base axes.
         """
+        fields = np.empty((len(states), 6, 1 + self.covariance_factor.shape[1]))
+        for chunk in split_into_chunks(len(states)):
+            fields[chunk] = self._compute_fields_of_chunk(states.select(chunk))
+        return fields
+
+    def _compute_fields_of_chunk(self, states: States) -> np.ndarray:
         model = self.model
         left_out = {
             number for number, effect in enumerate(model.effects) if is_left_out(effect)
         }
-        chain = model.sites.chain
-        end_poses = []
-        for values in (self.estimate, zero_coefficients(self.estimate, left_out)):
-            coordinates = compute_displaced_coordinates(
-                model, values, evaluate_conditions(model, values, states)
-            )
-            end_poses.append(compute_poses(chain, coordinates, chain.end_effector))
-        displacement = compute_pose_differences(*end_poses[0], *end_poses[1])
+        conditions = evaluate_conditions(model, self.estimate, states)
+        with_effects = self._compute_end_poses(self.estimate, conditions)
+        without = zero_coefficients(self.estimate, left_out)
+        without_effects = self._compute_end_poses(
+            without, evaluate_conditions(model, without, states)
+        )
+        displacement = compute_pose_differences(*with_effects, *without_effects)
         sensitivities = linearize(
-            model,
-            self.estimate,
-            build_observations(states),
-            evaluate_conditions(model, self.estimate, states),
+            model, self.estimate, build_observations(states), conditions
         ).sensitivities[..., _find_parameters(model, self.estimate)]
         spread = sensitivities @ self.covariance_factor
         return np.concatenate([displacement[..., None], spread], axis=2)
+
+    def _compute_end_poses(
+        self, estimate: Estimate, conditions: Conditions
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Compute position (S, 3), m, and rotation (S, 3, 3) of the end effector."""
+        chain = self.model.sites.chain
+        coordinates = compute_displaced_coordinates(self.model, estimate, conditions)
+        return compute_poses(chain, coordinates, chain.end_effector)
 
     def predict_branches(
         self, scope: Scope, states: States, position: np.ndarray, rotation: np.ndarray
