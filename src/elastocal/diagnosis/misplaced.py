@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import lu_factor, lu_solve
 
 from elastocal.fitting.model import get_parameter_values
 from elastocal.fitting.noise import PRIOR_SCALES
@@ -170,9 +171,11 @@ class _NormalEquations:
             precision = self.precision + np.diag(
                 np.where(is_geometry, prior_std**-2.0, 0.0)
             )
-            values = np.linalg.solve(precision, self.score)
+            factors = lu_factor(precision)
+            values = lu_solve(factors, self.score)
+            log_det = np.log(np.abs(np.diag(factors[0]))).sum()
             log_evidence = (
-                0.5 * (self.score @ values - np.linalg.slogdet(precision)[1])
+                0.5 * (self.score @ values - log_det)
                 - np.log(prior_std[is_geometry]).sum()
             )
             explanations.append(_Explanation(log_evidence, values))
