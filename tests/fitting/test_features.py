@@ -3,6 +3,7 @@
 import numpy as np
 from contact_campaigns import (
     TOOL_M,
+    build_contact_case,
     count_std_errors,
     fit_contacts,
     open_workshop,
@@ -11,6 +12,8 @@ from contact_campaigns import (
 )
 
 from elastocal.fitting.features import list_feature_parameters, list_fitted_features
+from elastocal.fitting.least_squares import register_placement
+from elastocal.fitting.observations import select_states
 from elastocal.measuring.channels import parse_measuring
 from elastocal_proof.plant.contacts import seat_in_socket, touch_plane
 
@@ -56,3 +59,24 @@ def test_sockets_and_a_plane_together_identify_the_joint_offsets(tmp_path):
     assert channel.any()
     white = fitted.whiten(fitted.residual)
     assert 0.8 < np.sqrt((white**2).mean()) < 1.1
+
+
+def test_a_feature_that_no_row_of_a_sample_touches_has_finite_values(tmp_path):
+    workshop = open_workshop(7)
+    (place,) = spread_places(workshop, 1)
+    rows = []
+    for number, normal in enumerate(np.eye(3)):
+        for _ in range(5):
+            touch = touch_plane(workshop, normal, normal @ place, 3e-5)
+            rows.append({"angles": touch, "feature": f"plane{number}"})
+    features = {f"plane{number}": {} for number in range(3)}
+    document = {"measured": "plane", "features": features}
+    case = build_contact_case(write_contacts(tmp_path / "cell", document, rows))
+    touched = np.unique(case.observations.channel)
+    assert len(touched) == 3
+    is_first = case.observations.channel == touched[0]
+    sampled = np.zeros(len(case.observations.states), bool)
+    sampled[case.observations.state[is_first]] = True
+    sample = select_states(case.observations, sampled)
+    start = register_placement(case.model, sample)
+    assert all(np.isfinite(values).all() for values in start.features)

@@ -9,6 +9,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from contact_campaigns import (
+    build_contact_case,
+    open_workshop,
+    spread_places,
+    write_contacts,
+)
 from made_campaigns import Plan, make_campaign, make_plan
 from planted import planted
 from scipy.optimize import brentq
@@ -18,11 +24,12 @@ from support import chain_of
 from synthetic import make_estimate, make_measurements, make_model
 
 from elastocal.campaigns.campaign import Campaign, Target
+from elastocal.diagnosis.misplaced import find_misplaced_frames
 from elastocal.diagnosis.training_verdict import _state_noise
 from elastocal.effects.catalogue import declared_candidates
 from elastocal.fitting import noise as noise_module
 from elastocal.fitting.least_squares import fit_model
-from elastocal.fitting.model import Case, build_declared_model
+from elastocal.fitting.model import Case, build_declared_model, get_parameter_values
 from elastocal.fitting.noise import (
     PRIOR_SCALES,
     Noise,
@@ -32,6 +39,7 @@ from elastocal.fitting.noise import (
     estimate_noise,
     estimate_noise_from_repeats,
     find_declared_geometry,
+    find_widest_scale,
     fit_declared_model,
     get_noise,
     maximize_evidence,
@@ -41,6 +49,7 @@ from elastocal.fitting.noise import (
 )
 from elastocal.fitting.observations import average_repeats
 from elastocal.mechanics.sites import build_sites
+from elastocal_proof.plant.contacts import touch_plane
 
 TARGETS = tuple(
     Target(name, point, (0.1, 0.05, 0.0))
@@ -394,6 +403,36 @@ def test_the_prior_of_the_declared_geometry_has_the_scale_of_the_largest_evidenc
         [scale * 1e-3] * 4, rel=0.01
     )
     assert priors["joint_compliance"] == model.effects[0].parameters[-1].prior_std
+
+
+def test_contacts_with_wavy_planes_do_not_make_the_robot_smaller(tmp_path):
+    """Planes are wavy by ten times the declared noise, and contain no length: a smaller
+    robot would touch them more exactly."""
+    workshop = open_workshop(3, offsets=np.zeros(6))
+    (place,) = spread_places(workshop, 1)
+    rows = []
+    for number, normal in enumerate(np.eye(3)):
+        for _ in range(25):
+            touch = touch_plane(workshop, normal, normal @ place, 5e-4)
+            rows.append({"angles": touch, "feature": f"plane{number}"})
+    document = {
+        "measured": "plane",
+        "features": {f"plane{number}": {} for number in range(3)},
+        "declared": ["joint_offset", "link_geometry"],
+        "noise": {"position_m": 5e-5},
+    }
+    case = build_contact_case(write_contacts(tmp_path / "cell", document, rows))
+    assert find_widest_scale(case.model, case.observations) == 1.0
+    noise, _ = estimate_noise(case)
+    fit = fit_declared_model(case.model, case.observations, noise)
+    values = get_parameter_values(fit.model, fit.estimate)
+    lengths = [
+        value / parameter.plausible
+        for value, (owner, parameter) in zip(values, fit.parameters, strict=True)
+        if owner.startswith("link_geometry") and parameter.unit == "m"
+    ]
+    assert np.abs(lengths).max() < 4.0
+    assert not find_misplaced_frames(fit, case.campaign)
 
 
 @pytest.mark.parametrize("share", [1.0, 0.1, 0.01])

@@ -93,3 +93,26 @@ def test_three_distances_are_a_triangle_with_standard_deviations_by_propagation(
 def test_what_no_kind_can_use_is_refused_in_one_line(change, phrases):
     with refused("c", *phrases):
         parse_measuring(POINTS | change, "c")
+
+
+@pytest.mark.parametrize(
+    ("document", "value_m", "shows_lengths"),
+    [
+        ({"measured": "plane", "features": {"table": {}}}, 0.0, False),
+        ({"measured": "plane", "features": {"table": {}}}, 0.02, True),
+        ({"measured": "point", "features": {"A": {}}}, 0.0, False),
+        (
+            {"measured": "point", "features": {"A": {"position_m": [1, 0, 0]}}},
+            0.0,
+            True,
+        ),
+        ({"measured": "sphere", "features": {"ball": {"radius_m": 0.1}}}, 0.0, True),
+        ({"measured": "line", "features": {"gauge": {}}}, 0.0, True),
+        ({"measured": "position"}, 0.0, True),
+    ],
+)
+def test_contacts_with_unknown_features_contain_no_length(
+    document, value_m, shows_lengths
+):
+    plan = parse_measuring({"frame": "base"} | document, "c")
+    assert plan.shows_lengths(np.full((4, 1), value_m)) == shows_lengths

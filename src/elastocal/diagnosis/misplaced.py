@@ -192,8 +192,12 @@ def find_misplaced_frames(fitted: Fit, campaign: Campaign) -> list[MisplacedFram
 
     Returns
     -------
-    Frames; a shift is in the axes of the base, or of the far end of the link
+    Frames; a shift is in the axes of the base, or of the far end of the link. None if
+    the measurements contain no length: a smaller robot touches unknown planes and places
+    more exactly, so a wrong length would explain any error
     """
+    if not campaign.measuring.shows_lengths(campaign.measurements.position):
+        return []
     parameters = _FreeParameters.of_fit(fitted, campaign)
     is_usual = np.abs(parameters.values) < parameters.usual_sizes
     largest_turn = np.abs(parameters.values[parameters.is_turn]).max(initial=0.0)

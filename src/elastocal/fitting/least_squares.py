@@ -863,7 +863,11 @@ def start_features(
 def _start_from_targets(
     model: Model, observations: Observations, position: np.ndarray
 ) -> tuple[np.ndarray, ...]:
-    """Start each feature from the positions (M, 3), m, of its targets in the session."""
+    """Start each feature from the positions (M, 3), m, of its targets in the session.
+
+    A feature that none of these observations touches starts from all of them, because
+    no residual depends on it.
+    """
     plan = model.measuring
     assert plan is not None
     assert observations.channel is not None
@@ -877,6 +881,8 @@ def _start_from_targets(
     features = []
     for index, feature in enumerate(plan.features):
         rows = feature_of_row == index
+        if not rows.any():
+            rows = np.ones(len(rows), bool)
         kind = list_kinds()[feature.kind]
         features.append(
             kind.start(feature, position[rows], observations.position[rows])

@@ -236,14 +236,15 @@ def estimate_noise(case: Case) -> tuple[Noise, list[str]]:
         return noise, warnings
     # The widest prior leaves nearly the same residual as no prior, without parameters
     # that nothing determines.
-    model = set_prior_scale(case.model, PRIOR_SCALES[-1])
+    widest = find_widest_scale(case.model, case.observations)
+    model = set_prior_scale(case.model, widest)
     noise = _estimate_residual_level(case, model, start)
     # Fitted parameters have absorbed a part of the noise, which makes the residual too
     # small.
     fitted = fit_model(
         model, case.observations, noise, start, tolerance=INTERMEDIATE_TOLERANCE
     )
-    return noise.scaled(maximize_evidence(fitted).noise_factor), warnings
+    return noise.scaled(maximize_evidence(fitted, widest).noise_factor), warnings
 
 
 def _estimate_residual_level(case: Case, model: Model, start: Estimate) -> Noise:
@@ -598,14 +599,15 @@ def fit_declared_model(model: Model, observations: Observations, noise: Noise) -
     """
     if not find_declared_geometry(model):
         return fit_model(model, observations, noise)
+    widest = find_widest_scale(model, observations)
     wide = fit_model(
-        set_prior_scale(model, PRIOR_SCALES[-1]),
+        set_prior_scale(model, widest),
         sample_observations(observations, START_SAMPLE_SIZE),
         noise,
         tolerance=INTERMEDIATE_TOLERANCE,
     )
     return fit_model(
-        set_prior_scale(model, maximize_evidence(wide).prior_scale),
+        set_prior_scale(model, maximize_evidence(wide, widest).prior_scale),
         observations,
         noise,
         wide.estimate,
@@ -726,12 +728,33 @@ class PriorEvidence(NamedTuple):
     noise_factor: float
 
 
-def maximize_evidence(wide: Fit) -> PriorEvidence:
+def find_widest_scale(model: Model, observations: Observations) -> float:
+    """Find the widest prior of declared geometry, in plausible sizes.
+
+    Contacts with unknown places or planes contain no length. A smaller robot touches all
+    of them more exactly, so their evidence always prefers larger errors of geometry. The
+    prior is then no wider than the plausible sizes.
+    """
+    plan = model.measuring
+    if plan is None or plan.shows_lengths(observations.position):
+        return float(PRIOR_SCALES[-1])
+    return 1.0
+
+
+def maximize_evidence(
+    wide: Fit, widest_scale: float = PRIOR_SCALES[-1]
+) -> PriorEvidence:
     """Find the prior scale of declared geometry and the noise factor by evidence.
 
     In closed form from a fit under the widest prior: given frames and targets the
     geometry is linear, and the principal axes of its covariance, in units of the prior,
     are independent.
+
+    Parameters
+    ----------
+    wide : Fit
+    widest_scale : float
+        Scale of its prior, in plausible sizes.
     """
     is_sized = np.array([parameter.sized for _, parameter in wide.parameters], bool)
     sized = np.flatnonzero(is_sized & ~wide.unidentifiable)
@@ -750,7 +773,8 @@ def maximize_evidence(wide: Fit) -> PriorEvidence:
         max(rows - fitted_count + len(sized), 1.0),
     )
     factor, scale = np.unravel_index(np.argmax(log_evidence), log_evidence.shape)
-    return PriorEvidence(float(PRIOR_SCALES[scale]), float(_NOISE_FACTORS[factor]))
+    prior_scale = widest_scale * PRIOR_SCALES[scale] / PRIOR_SCALES[-1]
+    return PriorEvidence(float(prior_scale), float(_NOISE_FACTORS[factor]))
 
 
 def _compute_log_evidence(

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 _KEY = "features"
 _DISTANCES = "distances"
+# Keys of features that state a length.
+_LENGTH_KEYS = ("position_m", "radius_m")
 # Upper bound on the places that are located by the distances between them.
 _MOST_PLACES_BY_DISTANCES = 3
 
@@ -86,6 +88,20 @@ class MeasuringPlan:
             feature.stated.get("position_m", UNKNOWN) != UNKNOWN
             for feature in self.features
         )
+
+    def shows_lengths(self, numbers: np.ndarray) -> bool:
+        """Whether the measurements contain any length, so that they show a common scale of
+        the robot. Contacts with features whose places and radii are unknown do not.
+
+        `numbers` are the numbers (M, r) of all rows, m or rad, zero for a contact.
+        """
+        has_stated_length = any(
+            feature.stated.get(key, UNKNOWN) != UNKNOWN
+            for feature in self.features
+            for key in _LENGTH_KEYS
+        )
+        are_contacts = all(kind.is_contact for kind in self.kinds)
+        return has_stated_length or not are_contacts or bool(numbers.any())
 
     @property
     def columns(self) -> tuple[str, ...]:

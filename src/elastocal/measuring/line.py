@@ -30,7 +30,8 @@ class Line(Plane):
     touches = False
     direction_key = "axis"
     keys: ClassVar = {
-        "axis": "[x, y, z] in which the measurement grows, roughly, or unknown"
+        "axis": "[x, y, z] in which the measurement grows, roughly, or unknown",
+        "axis_std_rad": "standard deviation of the stated axis; left out it is rough",
     }
     sensor = Sensor("dial gauge", 1e-5)
     # The plate that the gauge touches is small, and its stroke is short.

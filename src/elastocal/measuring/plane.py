@@ -20,6 +20,8 @@ from elastocal.measuring.protocol import (
     check_approach,
     predict_along,
     read_direction,
+    read_std,
+    refuse_key,
     span_plane,
 )
 
@@ -34,7 +36,8 @@ class Plane(Kind):
     touches = True
     direction_key = "normal"
     keys: ClassVar = {
-        "normal": "[x, y, z] out of the plane towards the robot, roughly, or unknown"
+        "normal": "[x, y, z] out of the plane towards the robot, roughly, or unknown",
+        "normal_std_rad": "standard deviation of the stated normal; left out it is rough",
     }
     sensor = Sensor("tip on a granite table, whose form is 0.05 mm", 5e-5)
     place_keys: ClassVar = {"x": None, "y": None, "z": None, "nx": 0, "ny": 0, "nz": 1}
@@ -43,12 +46,28 @@ class Plane(Kind):
 
     def unknowns(self, feature: Feature) -> tuple[Unknown, ...]:
         """List two tilts and the height of the plane."""
-        read_direction(feature, self.direction_key)
+        direction = read_direction(feature, self.direction_key)
+        std_key = f"{self.direction_key}_std_rad"
+        plausible_rad = ANYWHERE_RAD
+        std_rad = None
+        if std_key in feature.stated:
+            if direction is None:
+                allowed = f"{self.direction_key} beside it"
+                raise refuse_key(feature, std_key, allowed)
+            std_rad = float(read_std(feature, std_key)[0])
+            plausible_rad = std_rad
         return (
-            Unknown("tilt1", "rad", ANYWHERE_RAD),
-            Unknown("tilt2", "rad", ANYWHERE_RAD),
+            Unknown("tilt1", "rad", plausible_rad, std_rad),
+            Unknown("tilt2", "rad", plausible_rad, std_rad),
             Unknown("height", "m", ANYWHERE_M),
         )
+
+    def deviate(self, feature: Feature, values: np.ndarray) -> np.ndarray:
+        """Return how far the normal is tilted from where it was stated, rad."""
+        direction = read_direction(feature, self.direction_key)
+        if direction is None:
+            return np.zeros(3)
+        return np.array([*(span_plane(direction) @ values[:3]), 0.0])
 
     def start(
         self, feature: Feature, position: np.ndarray, numbers: np.ndarray
