@@ -137,7 +137,7 @@ def test_every_error_is_drawn_in_the_row_of_its_model():
     figure = draw_correction_errors(pd.DataFrame(rows), names)
     assert [axis.get_title() for axis in figure.axes] == [
         "unloaded",
-        "under loads",
+        "under load",
         "milling path",
     ]
     assert legend_entries(figure) == ["Yaskawa GP180", "KUKA KR 270"]

@@ -42,7 +42,7 @@ METRICS = pd.concat(
         for n, name in enumerate(ORDER, 1)
     ]
 )
-PAPER = "the paper's Table 4,\nside by side at one length"
+PAPER = "the paper's Table 4; marks at\nthe same length are spread"
 PRINTED = pd.DataFrame(
     [
         ("4", "kuka", "2DoF+6DoF", "k_sigma_4", 2.2),

@@ -384,8 +384,8 @@ def _describe_plan(survey: Survey, chosen: Plan, sensor: Sensor) -> list[str]:
         f" {frame}: {format_millimetres(chosen.accuracy_m[-1])} RMS over configurations"
         " that the cell allows; with as many random poses"
         f" {median:.3f} mm ({low:.3f} to {high:.3f}). {_describe_tool(survey)}",
-        "It includes the uncertainty of the parameters only, not the noise of"
-        f" {'the tracker' if survey.setup is None else 'the measurement'}.",
+        "It follows from the uncertainty of the fitted parameters and does not include"
+        f" the noise of {'the tracker' if survey.setup is None else 'the measurement'}.",
         f"Assumed noise: {noise}{source}.",
     ]
 
@@ -405,7 +405,7 @@ def _describe_improvement(accuracy_m: dict[str, float]) -> list[str]:
     others = f" ({'; '.join(further)})" if further else ""
     return [
         f"What would help most: {best}, {format_millimetres(accuracy_m[best])}"
-        f" in place of {format_millimetres(accuracy_m[''])}{others}."
+        f" instead of {format_millimetres(accuracy_m[''])}{others}."
     ]
 
 

@@ -35,7 +35,7 @@ _LENGTH_LABEL = "configurations in the data set"
 _BANDS_TITLE = (
     "bands: ± one Monte Carlo standard error; names of one estimator share a line"
 )
-_PRINTED_LABEL = "the paper's Table 4,\nside by side at one length"
+_PRINTED_LABEL = "the paper's Table 4; marks at\nthe same length are spread"
 # Configurations between the printed scores at one length, so that none hides another.
 _SPREAD = 1.6
 _QUANTITY_TITLES = {

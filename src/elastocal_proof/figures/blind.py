@@ -79,12 +79,12 @@ _ROBOT_HEIGHT = 14.0
 _LEGEND_COLUMNS = 2
 _MODELS = {
     "uncorrected": "uncorrected",
-    "geometry": "geometry alone",
+    "geometry": "geometry",
     "declared": "geometry and compliances",
     "found": "with the effects found",
     "true": "true model (repeatability)",
 }
-_PARTS = {"unloaded": "unloaded", "loaded": "under loads", "milling": "milling path"}
+_PARTS = {"unloaded": "unloaded", "loaded": "under load", "milling": "milling path"}
 # Vertical distance between the marks of two robots, in rows.
 _MARK_DISTANCE = 0.22
 
