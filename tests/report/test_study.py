@@ -75,7 +75,6 @@ def facts(**changed):
     return study_facts | {
         "citation": {
             "authors": "the developers",
-            "date": "2026-11-25",
             "version": "0.1.0",
             "license": "MIT",
         },

@@ -58,7 +58,6 @@ def state_answers(job: Job) -> None:
     facts |= {
         "citation": {
             "authors": ", ".join(author["name"] for author in citation["authors"]),
-            "date": str(citation["date-released"]),
             "version": citation["version"],
             "license": citation["license"],
         },
