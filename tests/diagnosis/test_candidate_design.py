@@ -10,6 +10,7 @@ from scipy.stats import chi2, ncx2
 
 from elastocal.diagnosis.candidate_design import (
     build_candidate_design,
+    explain_untestable,
     find_smallest_detectable_sizes,
     refine_shapes,
 )
@@ -170,3 +171,12 @@ def test_the_shapes_of_the_best_candidates_are_refined_about_the_best_value_of_e
     lags = np.geomspace(900.0, 36000.0, 5)
     expected_lags = np.geomspace(lags[1], lags[3], 9)
     np.testing.assert_allclose(refined["thermal_growth[time]"], expected_lags)
+
+
+def test_without_any_load_the_load_on_the_joints_is_no_further_reason(campaign):
+    lost_motion = campaign.candidates["lost_motion@2"]
+    angles = np.zeros((3, 6))
+    reason = explain_untestable(lost_motion, frozenset(), angles)
+    assert reason == "no load in the data"
+    only_weight = explain_untestable(lost_motion, frozenset({"load"}), angles)
+    assert only_weight == "no load on the joints in the data"

@@ -23,8 +23,10 @@ from elastocal.report.loop_facts import (
     describe_effect,
     format_cost,
     render_campaign_sentences,
+    summarize_effect,
     tabulate_causes,
     tabulate_compliances,
+    tabulate_untestable,
 )
 from elastocal.report.loop_facts import tabulate_steps as table_rows
 from elastocal.verdict import Accuracy, BoardErrors, Compliances
@@ -241,3 +243,19 @@ def test_errors_of_a_board_are_stated_in_the_camera_and_for_the_robot():
     assert rows[1][1] == "0.250, 0.8 mrad"
     assert rows[2][0].startswith("predicted, robot alone")
     assert len(render_campaign_sentences(verdict)["accuracy"]) == 2
+
+
+def test_the_summary_of_an_effect_is_a_whole_sentence():
+    """The docstring breaks this sentence over two lines."""
+    assert summarize_effect("transmission_harmonic").endswith(
+        "by eccentric and uneven parts"
+    )
+
+
+def test_locations_that_cannot_be_tested_are_listed_without_a_preposition():
+    reason = "no load in the data"
+    keys = ["link_elasticity@2", "link_elasticity@3[torsion]"]
+    rows = tabulate_untestable(dict.fromkeys(keys, reason))
+    assert rows == [
+        ["Elastic bending and torsion", "link 2 and link 3 (torsion)", reason]
+    ]

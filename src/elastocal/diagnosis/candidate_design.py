@@ -514,9 +514,12 @@ def explain_untestable(
     available : names of the data that a candidate may need, as of `Model.available_inputs`
     joint_angles : (S, n), at which was measured
     """
-    missing = sorted(candidate.needs - available)
+    missing = candidate.needs - available
+    if "load" in missing:
+        # Without any load there is none on the joints either.
+        missing -= {"load on the joints"}
     if missing:
-        return f"no {' and no '.join(missing)} in the data"
+        return f"no {' and no '.join(sorted(missing))} in the data"
     if not candidate.distinct_angles:
         return ""
     for joint in candidate.joints or candidate.turning:

@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 # Reasons why there is nothing to measure.
 NOT_DISTINGUISHABLE = "not distinguishable with this robot and tracker"
 NOTHING_MISSING = "nothing is missing"
-NOTHING_AMBIGUOUS = "nothing is ambiguous"
+NOTHING_AMBIGUOUS = "no other set of mechanisms is probable"
 DATA_AT_FAULT = "the data are at fault"
 NOTHING_TESTABLE = "the measurements can test no mechanism"
 # Number of random experiments to choose from.

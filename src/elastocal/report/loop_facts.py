@@ -429,11 +429,12 @@ def _format_interval(step: Row) -> str:
 
 
 def summarize_effect(effect: str) -> str:
-    """Return the first line of an effect's docstring without its formula."""
+    """Return the first paragraph of an effect's docstring without its formula."""
     definition = list_effects().get(effect)
     summary = say.split_underscores(effect)
     if definition and definition.doc:
-        summary = definition.doc.split("\n")[0]
+        paragraph, *_ = definition.doc.strip().split("\n\n")
+        summary = " ".join(paragraph.split())
     return re.sub(r", \w+\([^,]*=.*$", "", summary.split(":")[0]).rstrip(".")
 
 

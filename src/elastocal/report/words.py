@@ -134,6 +134,7 @@ def format_places(keys: Sequence[str]) -> str:
     """Return the locations of candidates of one effect without its name: joints 2 and 3;
     empty if they have none."""
     text = _format_locations(effect_of(keys[0]), map(_ANY_KEY.match, keys))
+    text = re.sub(r"(, | and )of (?=joint|link|the )", r"\1", text)
     return text.removeprefix(" of ").strip()
 
 
