@@ -23,3 +23,9 @@ def test_small_units_are_not_lost_beside_large_ones():
     factor = factor_covariance(correlation * np.outer(deviation, deviation))
     scaled = factor / deviation[:, None]
     np.testing.assert_allclose(scaled @ scaled.T, correlation, rtol=1e-12)
+
+
+def test_a_variance_that_rounding_has_made_negative_counts_as_zero():
+    """As of a direction whose share of the covariance has been subtracted."""
+    factor = factor_covariance(np.diag([1e-8, -1e-21]))
+    np.testing.assert_allclose(factor, np.diag([1e-4, 0.0]), atol=1e-18)

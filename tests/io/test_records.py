@@ -116,7 +116,7 @@ def test_a_missing_record_is_an_error(output):
 def test_a_file_that_changed_since_a_job_read_it_is_refused(jobs):
     Path(FITTED).write_text("another fit", encoding="utf-8")
     write_records(jobs[1])
-    with refused(FITTED, "", "not what draw kuka read"):
+    with refused(FITTED, "", "other contents than draw kuka read"):
         trace_jobs([DRAWN])
 
 

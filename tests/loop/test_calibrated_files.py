@@ -158,7 +158,7 @@ def test_results_of_another_engine_are_refused(checkout, tmp_path):
     with refused(
         changed / ENGINE,
         "",
-        "not what read_campaign made was made with",
+        "another version than read_campaign made was made with",
         f"elastocal diagnose {changed}/made",
     ):
         load_diagnosed(changed / "made", ROBOTS, changed)

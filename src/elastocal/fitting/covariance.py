@@ -11,7 +11,8 @@ def factor_covariance(covariance: np.ndarray) -> np.ndarray:
     signs of eigenvectors, or a basis of those with equal values, this root is unique, so
     that rounding does not change the robots that are drawn with it.
     """
-    deviation = np.sqrt(np.diag(covariance))
+    # Rounding leaves a variance that is zero slightly negative.
+    deviation = np.sqrt(np.diag(covariance).clip(min=0.0))
     scale = np.where(deviation > 0, deviation, 1.0)
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
     root = vectors * np.sqrt(values.clip(min=0.0)) @ vectors.T

@@ -197,7 +197,9 @@ def trace_jobs(targets: Iterable[str], within: str | Path = "") -> list[JobRecor
     for job in jobs.values():
         for path, digest in job.made_inputs.items():
             if digests[path] != digest:
-                raise _refusal(Path(within, path), f"not what {job.name} read")
+                raise _refusal(
+                    Path(within, path), f"other contents than {job.name} read"
+                )
     return [job for _, job in sorted(jobs.items())]
 
 
@@ -208,7 +210,7 @@ def check_sources(jobs: Iterable[JobRecord], within: str | Path, allowed: str) -
         for file, digest in job.sources.items():
             path = Path(within, file)
             if not path.is_file() or compute_sha256(path) != digest:
-                finding = f"not what {job.name} was made with"
+                finding = f"another version than {job.name} was made with"
                 raise InputError(path, "", finding, allowed)
 
 
