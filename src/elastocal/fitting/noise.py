@@ -450,7 +450,7 @@ def _compute_contrasts(
         linear_model = _standardize(linear_model, observations.spread)
     axes = compute_sensor_axes(nominal_model, nominal, observations)
     if axes is not None:
-        linear_model = _refer_to_readings(linear_model, axes)
+        linear_model = _refer_to_measurements(linear_model, axes)
     stacks = [
         _contrast_repeats(linear_model, members)
         for members in _stack_repeats(observations, averaged_state)
@@ -475,7 +475,7 @@ def _standardize(linear_model: LinearModel, spread: np.ndarray) -> LinearModel:
     )
 
 
-def _refer_to_readings(linear_model: LinearModel, axes: np.ndarray) -> LinearModel:
+def _refer_to_measurements(linear_model: LinearModel, axes: np.ndarray) -> LinearModel:
     """Express residuals and Jacobians as errors of what is read, by the residuals
     (M, r, r) that these cause."""
     columns = linear_model.columns
