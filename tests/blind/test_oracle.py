@@ -67,14 +67,14 @@ def test_the_oracle_fits_what_the_diagnosis_names_rightly(tmp_path, monkeypatch)
     oracle_of_untestable = run_without_terms(monkeypatch, truth, verdict, folder)
     assert oracle_of_untestable["candidates"] == []
     assert oracle_of_untestable["p_value"] == 1.0
-    assert oracle_of_untestable["rivals"] is None
+    assert oracle_of_untestable["alternatives"] is None
     informed = fit_oracle(truth, verdict, folder, ROBOTS.as_posix(), 1)
     [joint] = truth["defects"][0]["joints"]
     assert informed["candidates"] == [f"joint_offset@{joint}"]
     assert informed["detected"]
     assert informed["p_value"] < 1e-6
-    assert "link_geometry" in informed["rivals"]
-    assert "tracker_scale" not in informed["rivals"]
+    assert "link_geometry" in informed["alternatives"]
+    assert "tracker_scale" not in informed["alternatives"]
     # The diagnosis has a prior of the size and estimates the pose error; both change
     # the errors very little here.
     assert informed["heldout"] == pytest.approx(verdict["heldout"]["after"], rel=2e-3)

@@ -168,15 +168,15 @@ def test_an_arm_without_a_compensator_has_no_alias_of_it():
 
 
 @pytest.mark.parametrize(
-    ("rivals", "expected"), [([], True), (["link_weight"], False), (None, False)]
+    ("alternatives", "expected"), [([], True), (["link_weight"], False), (None, False)]
 )
 def test_a_case_is_distinguishable_if_the_oracle_excludes_every_other_mechanism(
-    rivals, expected
+    alternatives, expected
 ):
-    oracle = make_oracle(rivals=rivals)
+    oracle = make_oracle(alternatives=alternatives)
     row = build_case_row(PLAN, PAYLOAD, make_adequate_verdict(), oracle)
     assert row["distinguishable"] is expected
-    assert row["rivals"] == " + ".join(rivals or [])
+    assert row["oracle_alternatives"] == " + ".join(alternatives or [])
 
 
 def test_a_verdict_that_a_fault_of_the_data_ended_has_no_errors_and_states_nothing():

@@ -119,12 +119,12 @@ def make_adequate_verdict(**changes):
     )
 
 
-def make_oracle(p_value=1e-6, rms=1e-4, rivals=None):
+def make_oracle(p_value=1e-6, rms=1e-4, alternatives=None):
     return {
         "candidates": [],
         "p_value": p_value,
         "detected": p_value < 0.05,
-        "rivals": rivals,
+        "alternatives": alternatives,
         "heldout": {"rms_m": rms},
     }
 

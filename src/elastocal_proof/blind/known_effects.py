@@ -1,5 +1,5 @@
-"""Score and test effects that an analyst knows: what the oracle and the search for its
-rivals have in common.
+"""Score and test effects that an analyst knows: what the oracle and the search for
+alternatives have in common.
 
 References
 ----------
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.observations import Observations
 
-# Level of the tests of the oracle and of its rivals.
+# Level of the tests of the oracle.
 LEVEL = 0.05
 
 
@@ -83,12 +83,14 @@ def score_candidates(
     scored = {}
     for key, index in best_terms.items():
         term = problem.terms[index]
+        candidate = term.candidate
+        assert candidate is not None
         prior_std = problem.grid.root_mean_square(term) * term.sizes
         scored[key] = ScoredCandidate(
             float(log_bayes_factors[index]),
-            term.candidate,
+            candidate,
             term.shapes,
-            set_prior_std(term.candidate, prior_std),
+            set_prior_std(candidate, prior_std),
         )
     return scored
 

@@ -18,6 +18,7 @@ from elastocal.io.json_files import read_json, write_json
 from elastocal.io.typed_json import to_document
 from elastocal.loop.whole import read_cases
 from elastocal.validation.transfer import find_extrapolated_poses
+from elastocal_proof.blind.alternatives import find_alternatives
 from elastocal_proof.blind.folders import load_ground_truth
 from elastocal_proof.blind.known_effects import (
     LEVEL,
@@ -26,7 +27,6 @@ from elastocal_proof.blind.known_effects import (
     fit_scored_candidates,
     score_candidates,
 )
-from elastocal_proof.blind.rivals import find_rivals
 from elastocal_proof.plant.kinds import OUTSIDE
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def fit_oracle(
     -------
     dict or None
         ``candidates`` in the model; ``p_value``, 1 if the data identify none of them;
-        ``detected`` at the level of 5 %; ``rivals``, other mechanisms beside which the
+        ``detected`` at the level of 5 %; ``alternatives``, other mechanisms beside which the
         true one is not significant, None if it is not detected or if there are several;
         ``heldout``, errors of the held-out poses as in verdict.json. None if an effect
         is outside of the catalogue, because no model has that effect.
@@ -95,16 +95,16 @@ def fit_oracle(
     fitted = fit_scored_candidates(declared, case.observations, selected)
     candidates = [scored.candidate for scored in selected]
     p_value = min(variants * compute_wald_p_value(fitted, candidates), 1.0)
-    rivals = None
+    others = None
     if p_value < LEVEL and len(truth["case"]["effects"]) == 1:
-        rivals = find_rivals(
+        others = find_alternatives(
             declared, case.observations, case.candidates.values(), selected
         )
     outside = find_extrapolated_poses(fitted, case, held_out)
     _, heldout, _ = compare_held_out_errors(
         [Step("oracle", "declared", fitted)], (case, held_out), outside, noise, seed
     )
-    return _describe_outcome(candidates, p_value, rivals, to_document(heldout.declared))
+    return _describe_outcome(candidates, p_value, others, to_document(heldout.declared))
 
 
 def list_variants(
@@ -147,7 +147,7 @@ def _sum_log_bayes_factors(variant: Iterable[ScoredCandidate]) -> float:
 def _describe_outcome(
     candidates: Iterable[Candidate],
     p_value: float,
-    rivals: list[str] | None,
+    alternatives: list[str] | None,
     heldout: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Describe the result of the oracle as its file does."""
@@ -155,7 +155,7 @@ def _describe_outcome(
         "candidates": [candidate.key for candidate in candidates],
         "p_value": p_value,
         "detected": p_value < LEVEL,
-        "rivals": rivals,
+        "alternatives": alternatives,
         "heldout": heldout,
     }
 

@@ -47,7 +47,7 @@ EXACT_ALIASES: dict[tuple[str, tuple[int, ...]], str] = {
 # Results of a case without an oracle.
 _NO_ORACLE: Document = {
     "detected": np.nan,
-    "rivals": None,
+    "alternatives": None,
     "heldout": {"rms_m": np.nan},
 }
 # Errors got worse if their increase is beyond this many standard errors.
@@ -158,7 +158,6 @@ def build_case_row(
         ``distinguishable``, the oracle detects the effect and excludes every other
         mechanism.
     """
-    oracle = oracle or _NO_ORACLE
     case = truth["case"]
     defects = truth["defects"]
     kind, effects = _remove_setup_effects(truth, verdict)
@@ -198,10 +197,7 @@ def build_case_row(
         ),
         **_describe_size(truth),
         **_describe_errors(verdict),
-        "oracle_detected": float(oracle["detected"]),
-        "oracle_rms_m": oracle["heldout"]["rms_m"],
-        "distinguishable": oracle["rivals"] == [],
-        "rivals": " + ".join(oracle["rivals"] or ()),
+        **_describe_oracle(oracle or _NO_ORACLE),
         **score_probabilities(truth, verdict, _find_hidden_effects(plan, case)),
     }
 
@@ -303,6 +299,17 @@ def _describe_errors(verdict: Document) -> dict[str, Any]:
         "after_rms_m": after,
         "adopted": any(effect["adopted"] for effect in verdict["effects"]),
         "worse": bool(1.0 - after / declared + _STD_ERRORS * std_error < 0.0),
+    }
+
+
+def _describe_oracle(oracle: Document) -> dict[str, Any]:
+    """Describe what the oracle detects, and which other mechanisms it cannot exclude."""
+    alternatives = oracle["alternatives"]
+    return {
+        "oracle_detected": float(oracle["detected"]),
+        "oracle_rms_m": oracle["heldout"]["rms_m"],
+        "distinguishable": alternatives == [],
+        "oracle_alternatives": " + ".join(alternatives or ()),
     }
 
 

@@ -3,13 +3,13 @@
 How often can a mechanism be stated alone at all? An analyst who knows the true effect
 and its joints asks of every other mechanism whether the measurements exclude it as the
 only cause. Both are fitted together, and the test of the oracle decides whether the true
-effect is needed beside the other mechanism. If it is not, the other one is a rival: it
-explains the measurements as well.
+effect is needed beside the other mechanism. If it is not, the other one is an alternative:
+it explains the measurements as well.
 
 The other mechanism acts at as many joints as the true one, those at which it explains
 most by itself, and may have any plausible size. The
 test trusts all laws exactly, and it tests one mechanism at a time.
-So a case without rivals is one in which an analyst who trusts the laws can exclude every
+So a case without alternatives is one in which an analyst who trusts the laws can exclude every
 other cause.
 """
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from elastocal_proof.blind.known_effects import ScoredCandidate
 
 
-def find_rivals(
+def find_alternatives(
     declared: Fit,
     observations: Observations,
     candidates: Iterable[Candidate],
@@ -42,7 +42,7 @@ def find_rivals(
 ) -> list[str]:
     """Find the mechanisms beside which the true effect is not significant.
 
-    Mechanisms that explain nothing by themselves are no rivals.
+    Mechanisms that explain nothing by themselves are no alternatives.
 
     Parameters
     ----------
@@ -65,15 +65,15 @@ def find_rivals(
     scored_others = score_candidates(declared, observations, others)
     true_candidates = [scored.candidate for scored in true_effect]
     joints = {candidate.joints for candidate in true_candidates}
-    rivals = []
+    alternatives = []
     for mechanism, scored in _group_by_mechanism(scored_others.values()).items():
-        alternative = _select_locations(scored, len(joints))
-        if not alternative:
+        selected = _select_locations(scored, len(joints))
+        if not selected:
             continue
-        fitted = fit_scored_candidates(declared, observations, true_effect, alternative)
+        fitted = fit_scored_candidates(declared, observations, true_effect, selected)
         if compute_wald_p_value(fitted, true_candidates) >= LEVEL:
-            rivals.append(mechanism)
-    return rivals
+            alternatives.append(mechanism)
+    return alternatives
 
 
 def _group_by_mechanism(
