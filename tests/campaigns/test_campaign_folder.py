@@ -9,6 +9,7 @@ import yaml
 
 from elastocal.campaigns import campaign_folder
 from elastocal.campaigns.reading import read_campaign, read_held_out_campaign
+from elastocal.errors import InputError
 
 
 @pytest.fixture
@@ -100,3 +101,13 @@ def test_a_campaign_knows_its_documents(cell):
     assert folder.source == cell.source
     robot_text = (cell.folder / "arm.yaml").read_text(encoding="utf-8")
     assert folder.robot_document == yaml.safe_load(robot_text)
+
+
+def test_the_document_of_the_campaign_is_no_robot_of_its_folder(cell):
+    cell.document["robot"] = "campaign"
+    cell.write()
+    with pytest.raises(InputError, match="or a robot of") as caught:
+        campaign_folder.read_campaign_folder(cell.folder, cell.folder)
+    assert (
+        "campaign" not in str(caught.value).partition("or a robot of")[2].split(":")[1]
+    )

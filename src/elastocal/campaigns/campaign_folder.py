@@ -187,7 +187,8 @@ def read_campaign_folder(path: str | Path, robots_folder: str | Path) -> Campaig
     document = read_document(source)
     check_document(document, "campaign", source)
     robot = document["robot"]
-    named_robots = sorted(file.stem for file in robots_folder.glob("*.yaml"))
+    files = robots_folder.glob("*.yaml")
+    named_robots = sorted(file.stem for file in files if file.name != DOCUMENT)
     is_named = robot in named_robots
     robot_file = robots_folder / f"{robot}.yaml" if is_named else path / robot
     if not is_file_in(robot_file, path, robots_folder):
