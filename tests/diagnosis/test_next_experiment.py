@@ -146,6 +146,39 @@ def test_an_alias_does_not_keep_other_hypotheses_from_being_distinguished(kuka):
     assert experiment.separation > 2
 
 
+def make_certain(diagnosis, alternatives):
+    """A diagnosis whose best hypothesis is certain, with the alternatives that it states
+    for the mechanism of this hypothesis."""
+    conclusion = diagnosis.evidence.conclusion
+    best = conclusion.best.mechanisms
+    hypotheses = tuple(
+        replace(entry, probability=1.0 if entry.mechanisms == best else 1e-9)
+        for entry in conclusion.hypotheses
+    )
+    certain = replace(
+        conclusion,
+        hypotheses=tuple(sorted(hypotheses, key=lambda entry: -entry.probability)),
+        best=next(entry for entry in hypotheses if entry.mechanisms == best),
+        alternatives={best[0]: alternatives},
+    )
+    evidence = SimpleNamespace(**vars(diagnosis.evidence) | {"conclusion": certain})
+    return SimpleNamespace(**vars(diagnosis) | {"evidence": evidence})
+
+
+def test_an_alternative_that_is_stated_is_distinguished_however_improbable(ambiguous):
+    best = ambiguous.evidence.conclusion.best.mechanisms
+    alternative = next(
+        entry.mechanisms
+        for entry in ambiguous.evidence.conclusion.hypotheses
+        if len(entry.mechanisms) == 1 and entry.mechanisms not in (best, ("other",))
+    )
+    stream = np.random.default_rng(0)
+    _, experiment = propose_experiment(make_certain(ambiguous, alternative), stream)
+    assert experiment.nearest == alternative
+    _, experiment = propose_experiment(make_certain(ambiguous, ()), stream)
+    assert experiment.reason == NOTHING_AMBIGUOUS
+
+
 def test_nothing_is_proposed_if_nothing_is_ambiguous(kuka):
     # With this many poses, an additional unknown effect has less probability than an
     # unambiguous diagnosis may leave open.

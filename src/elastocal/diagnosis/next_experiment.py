@@ -34,6 +34,7 @@ from elastocal.diagnosis.verdict import (
     ADEQUATE,
     NAMED,
     NOT_TESTABLE,
+    Conclusion,
     Evidence,
     Hypothesis,
 )
@@ -557,11 +558,29 @@ def _find_reason_against(evidence: Evidence) -> str:
 
 
 def _select_hypotheses(evidence: Evidence) -> list[Hypothesis]:
-    """The best hypothesis, and the other credible ones by their probability."""
+    """Select the best hypothesis, the other credible ones and those that the verdict
+    states as alternatives, by their probability."""
     conclusion = evidence.conclusion
     present = [h for h in conclusion.hypotheses if h.mechanisms and h.model >= 0]
     cumulative = np.cumsum([h.probability for h in present])
     least = evidence.design.settings.credible * cumulative[-1]
     credible = present[: int(np.searchsorted(cumulative, least)) + 1]
+    stated = _list_stated_mechanisms(conclusion)
     best = conclusion.best
-    return [best, *(h for h in credible if h != best)][:_HYPOTHESES]
+    others = [
+        hypothesis
+        for hypothesis in present
+        if hypothesis in credible or set(hypothesis.mechanisms) in stated
+    ]
+    return [best, *(h for h in others if h != best)][:_HYPOTHESES]
+
+
+def _list_stated_mechanisms(conclusion: Conclusion) -> list[set[str]]:
+    """List the sets of mechanisms that a verdict states: in each an alternative is in the
+    place of a mechanism of the best hypothesis."""
+    best = set(conclusion.best.mechanisms)
+    return [
+        best - {name} | {alternative}
+        for name, alternatives in conclusion.alternatives.items()
+        for alternative in alternatives
+    ]
