@@ -76,7 +76,7 @@ def draw_method_errors(table: pd.DataFrame, methods: Mapping[str, Method]) -> Fi
     axes[0, 0].set_yticks(range(len(names)), labels)
     axes[0, 0].set_ylim(len(names) - 0.5, -0.5)
     figure.legend(
-        *axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4
+        *axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3
     )
     return figure
 
@@ -171,8 +171,8 @@ def draw_mechanisms(table: pd.DataFrame) -> Figure:
     axis.set_xlim(-0.5, len(names) - 0.2)
     axis.set_ylim(len(mechanisms) - 0.5, -0.5)
     figure.colorbar(circles, ax=axis, label="probability (mean over folds)", shrink=0.8)
-    axis.set_title(
-        "Circle: share of the squared residual of the geometric model, in units of the noise"
+    figure.suptitle(
+        "Circle: share of the squared residual of geometry alone, in units of the noise"
     )
     return figure
 
