@@ -96,7 +96,8 @@ def fit_oracle(
     candidates = [scored.candidate for scored in selected]
     p_value = min(variants * compute_wald_p_value(fitted, candidates), 1.0)
     others = None
-    if p_value < LEVEL and len(truth["case"]["effects"]) == 1:
+    mechanisms = {defect["effect"] for defect in defects}
+    if p_value < LEVEL and len(mechanisms) == 1:
         others = find_alternatives(
             declared, case.observations, case.candidates.values(), selected
         )
