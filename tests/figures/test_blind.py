@@ -79,9 +79,9 @@ def test_power_has_a_share_for_each_effect_and_level_and_marks_absorbed_effects(
     )
     figure = draw_power(rates)
     assert row_labels(figure.axes[0]) == [
-        "payload",
-        "lost motion",
-        "force scale *",
+        "weight of an undeclared payload",
+        "lost motion (backlash)",
+        "scale error of the force sensor *",
         "all effects",
     ]
     assert texts_in_axes(figure) == ["50", "90", "70", "0", "0", "70"] * 5

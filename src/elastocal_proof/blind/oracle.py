@@ -96,8 +96,7 @@ def fit_oracle(
     candidates = [scored.candidate for scored in selected]
     p_value = min(variants * compute_wald_p_value(fitted, candidates), 1.0)
     others = None
-    mechanisms = {defect["effect"] for defect in defects}
-    if p_value < LEVEL and len(mechanisms) == 1:
+    if p_value < LEVEL and len({defect["effect"] for defect in defects}) == 1:
         others = find_alternatives(
             declared, case.observations, case.candidates.values(), selected
         )

@@ -24,6 +24,7 @@ from elastocal.figures.style import (
     styled,
 )
 from elastocal.io.origin import Origin
+from elastocal.report.words import name_effect
 from elastocal_proof.blind.cases import PROOF, TUNED
 from elastocal_proof.blind.summary import iterate_rows, select_targets
 
@@ -49,9 +50,9 @@ _MIN_TARGET_WIDTH = 0.8
 _PANELS = {
     "oracle_detected": "the oracle\ndetects",
     "detected": "detected",
-    "holds_truth": "mechanism\namong stated",
-    "named_right": "mechanism,\nno alternative",
-    "located": "and at the\ntrue joints",
+    "holds_truth": "among the\nstated",
+    "named_right": "stated\nalone",
+    "located": "with its\njoints",
 }
 # Never black, so that the numbers are legible everywhere.
 _SHARE_COLORS = LinearSegmentedColormap.from_list(
@@ -226,7 +227,6 @@ def draw_power(rates: pd.DataFrame) -> Figure:
             xticks=range(len(levels)),
             yticks=range(len(effects)),
             title=title,
-            xlabel="non-centrality",
         )
         axis.set_xticklabels([f"{level:g}" for level in levels])
         if _ALL in effects:
@@ -235,7 +235,10 @@ def draw_power(rates: pd.DataFrame) -> Figure:
     axes[0, 0].set_yticklabels(
         [_label_effect(name, absorbed) for name in effects], fontsize=7
     )
-    caption = "Numbers are shares of cases in %; hatched: no case."
+    caption = (
+        "Shares of cases in % by the non-centrality of the true mechanism; hatched: no"
+        " case."
+    )
     if absorbed:
         caption += (
             "\n* Wholly absorbed by the joint compliances: the size is that before"
@@ -246,7 +249,7 @@ def draw_power(rates: pd.DataFrame) -> Figure:
 
 
 def _label_effect(name: str, absorbed: set[str]) -> str:
-    label = "all effects" if name == _ALL else name.replace("_", " ")
+    label = "all effects" if name == _ALL else name_effect(name)
     return f"{label} *" if name in absorbed else label
 
 
