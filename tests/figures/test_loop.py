@@ -207,8 +207,8 @@ def test_each_campaign_has_both_errors_at_their_values():
     assert row_labels(
         draw_errors_by_campaign(TABLE.assign(campaign="fanuc_joint")).axes[0]
     ) == [
-        "FANUC one-joint poses, 24 poses",
-        "FANUC one-joint poses, 1 pose",
+        "FANUC both sessions, 24 poses",
+        "FANUC both sessions, 1 pose",
     ]
 
 

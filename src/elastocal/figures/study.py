@@ -421,6 +421,7 @@ def draw_multiverse(table: pd.DataFrame) -> Figure:
             axis.xaxis.set_major_locator(LogLocator(numticks=6))
         axis.grid(visible=False, axis="y")
     axes[0, 0].set_yticks(range(len(numbers)), labels=numbers)
+    axes[0, 0].set_ylabel("interpretation")
     add_legend_below(
         figure, 2, "factor between the printed figures and ours (at least 1), median"
     )

@@ -53,9 +53,9 @@ _PARAMETER_WORDS = (
 _DATA_SET_WORDS = (
     (r"^(fanuc|ur5|ur10|wam|kuka|fr3)\b", lambda robot: robot[0].upper()),
     (r"^(motoman|panda)\b", lambda robot: robot[0].capitalize()),
-    (r"\bcpa\b", "circle points"),
+    (r"\bjoint\b", "both sessions"),
+    (r"\bcpa\b", "one-joint poses"),
     (r"\bstatic\b", "static poses"),
-    (r"\bjoint\b", "one-joint poses"),
     (r"\b(grid|random)\b", r"\1 poses"),
 )
 # Common kind of the mechanisms of a family.
