@@ -8,6 +8,7 @@ from contact_campaigns import (
     fit_contacts,
     open_workshop,
     spread_places,
+    touch_crossing_planes,
     write_contacts,
 )
 
@@ -63,13 +64,7 @@ def test_sockets_and_a_plane_together_identify_the_joint_offsets(tmp_path):
 
 def test_a_feature_that_no_row_of_a_sample_touches_has_finite_values(tmp_path):
     workshop = open_workshop(7)
-    (place,) = spread_places(workshop, 1)
-    rows = []
-    for number, normal in enumerate(np.eye(3)):
-        for _ in range(5):
-            touch = touch_plane(workshop, normal, normal @ place, 3e-5)
-            rows.append({"angles": touch, "feature": f"plane{number}"})
-    features = {f"plane{number}": {} for number in range(3)}
+    rows, features = touch_crossing_planes(workshop, 5, 3e-5)
     document = {"measured": "plane", "features": features}
     case = build_contact_case(write_contacts(tmp_path / "cell", document, rows))
     touched = np.unique(case.observations.channel)

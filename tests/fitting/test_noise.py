@@ -12,7 +12,7 @@ import pytest
 from contact_campaigns import (
     build_contact_case,
     open_workshop,
-    spread_places,
+    touch_crossing_planes,
     write_contacts,
 )
 from made_campaigns import Plan, make_campaign, make_plan
@@ -49,7 +49,6 @@ from elastocal.fitting.noise import (
 )
 from elastocal.fitting.observations import average_repeats
 from elastocal.mechanics.sites import build_sites
-from elastocal_proof.plant.contacts import touch_plane
 
 TARGETS = tuple(
     Target(name, point, (0.1, 0.05, 0.0))
@@ -409,15 +408,10 @@ def test_contacts_with_wavy_planes_do_not_make_the_robot_smaller(tmp_path):
     """Planes are wavy by ten times the declared noise, and contain no length: a smaller
     robot would touch them more exactly."""
     workshop = open_workshop(3, offsets=np.zeros(6))
-    (place,) = spread_places(workshop, 1)
-    rows = []
-    for number, normal in enumerate(np.eye(3)):
-        for _ in range(25):
-            touch = touch_plane(workshop, normal, normal @ place, 5e-4)
-            rows.append({"angles": touch, "feature": f"plane{number}"})
+    rows, features = touch_crossing_planes(workshop, 25, 5e-4)
     document = {
         "measured": "plane",
-        "features": {f"plane{number}": {} for number in range(3)},
+        "features": features,
         "declared": ["joint_offset", "link_geometry"],
         "noise": {"position_m": 5e-5},
     }

@@ -14,7 +14,7 @@ from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.noise import estimate_noise
 from elastocal.loop.loading import load_campaign
 from elastocal.mechanics.kinematics import compute_point_poses
-from elastocal_proof.plant.contacts import Workshop
+from elastocal_proof.plant.contacts import Workshop, touch_plane
 
 ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 # Errors of the zeros of the joints, rad, and the tool in the frame of the flange, m.
@@ -48,6 +48,18 @@ def spread_places(workshop, count):
     middle = workshop.joint_limits.mean(axis=1)
     steps = np.array([[0.0] * 6, [0.5, 0.1, 0.1, 0, 0, 0], [-0.4, 0.2, -0.3, 0, 0, 0]])
     return workshop.locate(middle + steps[:count])[0]
+
+
+def touch_crossing_planes(workshop, touches, noise_m):
+    """Rows of so many touches of each of three planes at right angles through one place,
+    and the planes as features of a campaign."""
+    (place,) = spread_places(workshop, 1)
+    rows = []
+    for number, normal in enumerate(np.eye(3)):
+        for _ in range(touches):
+            angles = touch_plane(workshop, normal, normal @ place, noise_m)
+            rows.append({"angles": angles, "feature": f"plane{number}"})
+    return rows, {f"plane{number}": {} for number in range(3)}
 
 
 def write_contacts(folder, document, rows, robots=ROBOTS):

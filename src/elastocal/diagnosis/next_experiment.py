@@ -34,9 +34,9 @@ from elastocal.diagnosis.verdict import (
     ADEQUATE,
     NAMED,
     NOT_TESTABLE,
-    Conclusion,
     Evidence,
     Hypothesis,
+    replace_mechanism,
 )
 from elastocal.fitting.model import evaluate_conditions
 from elastocal.fitting.observations import Observations, States
@@ -565,22 +565,11 @@ def _select_hypotheses(evidence: Evidence) -> list[Hypothesis]:
     cumulative = np.cumsum([h.probability for h in present])
     least = evidence.design.settings.credible * cumulative[-1]
     credible = present[: int(np.searchsorted(cumulative, least)) + 1]
-    stated = _list_stated_mechanisms(conclusion)
     best = conclusion.best
-    others = [
-        hypothesis
-        for hypothesis in present
-        if hypothesis in credible or set(hypothesis.mechanisms) in stated
-    ]
-    return [best, *(h for h in others if h != best)][:_HYPOTHESES]
-
-
-def _list_stated_mechanisms(conclusion: Conclusion) -> list[set[str]]:
-    """List the sets of mechanisms that a verdict states: in each an alternative is in the
-    place of a mechanism of the best hypothesis."""
-    best = set(conclusion.best.mechanisms)
-    return [
-        best - {name} | {alternative}
+    stated = [
+        replace_mechanism(best.mechanisms, name, alternative)
         for name, alternatives in conclusion.alternatives.items()
         for alternative in alternatives
     ]
+    others = [h for h in present if h in credible or h.mechanisms in stated]
+    return [best, *(h for h in others if h != best)][:_HYPOTHESES]

@@ -306,9 +306,9 @@ def _add_confounded_mechanisms(
     for name, listed in conclusion.alternatives.items():
         confounded = find_confounded_mechanisms(problem, model, name)
         alternatives[name] = tuple(dict.fromkeys((*listed, *confounded)))
-        companions = [mechanism for mechanism in best.mechanisms if mechanism != name]
         replaced |= {
-            tuple(sorted([*companions, mechanism])) for mechanism in confounded
+            replace_mechanism(best.mechanisms, name, mechanism)
+            for mechanism in confounded
         }
     if not replaced:
         return conclusion
@@ -323,6 +323,14 @@ def _add_confounded_mechanisms(
         alternatives=alternatives,
         probability=min(_sum_probabilities(listed_hypotheses), 1.0),
     )
+
+
+def replace_mechanism(
+    mechanisms: tuple[str, ...], name: str, alternative: str
+) -> tuple[str, ...]:
+    """Put an alternative in the place of one of the mechanisms of a hypothesis."""
+    companions = set(mechanisms) - {name}
+    return tuple(sorted(companions | {alternative}))
 
 
 def _compute_inclusion_probabilities(

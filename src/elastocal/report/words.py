@@ -126,16 +126,15 @@ def format_candidate(key: str) -> str:
 
 def format_location(effect: str, location: str) -> str:
     """Return a location without its effect: links 1, 2 and 3 (one section)."""
-    text = _format_locations(effect, [_LOCATION.match(location)])
-    return text.removeprefix(" of ").strip() or "the whole robot"
+    (text,) = _list_locations(effect, [_LOCATION.match(location)])
+    return text.removeprefix("of ") or "the whole robot"
 
 
 def format_places(keys: Sequence[str]) -> str:
     """Return the locations of candidates of one effect without its name: joints 2 and 3;
     empty if they have none."""
-    text = _format_locations(effect_of(keys[0]), map(_ANY_KEY.match, keys))
-    text = re.sub(r"(, | and )of (?=joint|link|the )", r"\1", text)
-    return text.removeprefix(" of ").strip()
+    locations = _list_locations(effect_of(keys[0]), map(_ANY_KEY.match, keys))
+    return join_items(location.removeprefix("of ") for location in locations)
 
 
 def format_joints(effect: str, joints: Collection[int]) -> str:
@@ -147,7 +146,15 @@ def format_joints(effect: str, joints: Collection[int]) -> str:
 
 
 def _format_locations(effect: str, matches: Iterable[re.Match[str] | None]) -> str:
-    """Return joints or links with their details: " of joint 4 (orders 1-2)".
+    """Return joints or links with their details: " of joint 4 (orders 1-2)". Arguments as
+    in `_list_locations`."""
+    locations = _list_locations(effect, matches)
+    return f" {join_items(locations)}" if any(locations) else ""
+
+
+def _list_locations(effect: str, matches: Iterable[re.Match[str] | None]) -> list[str]:
+    """Return each location with its details, "of joint 4 (orders 1-2)", or all joints in
+    one text if they have no details. The whole robot is an empty text.
 
     Parameters
     ----------
@@ -164,13 +171,13 @@ def _format_locations(effect: str, matches: Iterable[re.Match[str] | None]) -> s
         if match["detail"]:
             details.append(match["detail"])
     if _can_list_joints_alone(details_by_joints):
-        return format_joints(effect, sorted(joints[0] for joints in details_by_joints))
+        listed_joints = sorted(joints[0] for joints in details_by_joints)
+        return [format_joints(effect, listed_joints).strip()]
     in_list = len(details_by_joints) > 1
-    locations = [
+    return [
         _format_single_location(effect, joints, ", ".join(details), in_list=in_list)
         for joints, details in details_by_joints.items()
     ]
-    return f" {join_items(locations)}" if any(locations) else ""
 
 
 def _can_list_joints_alone(

@@ -111,7 +111,7 @@ def fit_scored_candidates(
     return fit_selected_effects(declared, observations, declared.noise, effects)
 
 
-def compute_wald_p_value(fitted: Fit, candidates: Iterable[Candidate]) -> float:
+def compute_wald_p_value(fitted: Fit, candidates: Sequence[Candidate]) -> float:
     """Compute the p-value of all coefficients of some candidates at once.
 
     The Wald statistic [1]_ has the covariance of the fit at its shapes. A fitted shape
@@ -125,10 +125,9 @@ def compute_wald_p_value(fitted: Fit, candidates: Iterable[Candidate]) -> float:
     candidates
         What is tested.
     """
-    tested_candidates = [*candidates]
     linear: list[int] = []
     shapes: list[int] = []
-    for candidate in tested_candidates:
+    for candidate in candidates:
         indices = fitted.parameter_indices(candidate.key).tolist()
         linear += indices[: len(candidate.parameters)]
         shapes += indices[len(candidate.parameters) :]
@@ -137,7 +136,7 @@ def compute_wald_p_value(fitted: Fit, candidates: Iterable[Candidate]) -> float:
     if not is_tested.any():
         return 1.0
     values = np.concatenate(
-        [fitted.effect_values(candidate.key)[0] for candidate in tested_candidates]
+        [fitted.effect_values(candidate.key)[0] for candidate in candidates]
     )[np.isin(linear, identified)]
     information = np.linalg.inv(fitted.covariance[np.ix_(identified, identified)])
     is_shape = np.isin(identified, shapes)

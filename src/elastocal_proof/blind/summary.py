@@ -276,13 +276,19 @@ def simulate_calibrated(rows: pd.DataFrame, seed: int) -> dict[str, Any]:
     """
     cases = len(rows)
     probability = rows.stated.to_numpy(float)
-    draws = open_stream(seed, "blind", "calibration error by chance", 0)
-    outcomes = draws.random((_RESAMPLES, cases)) < probability
+    outcomes = _draw_calibrated(probability, "calibration error by chance", seed)
     replicates = compute_calibration_error(
         np.broadcast_to(probability, outcomes.shape), outcomes
     )
     mean = float(replicates.mean()) if cases else np.nan
     return _describe_estimate(cases, mean, np.nan, np.nan)
+
+
+def _draw_calibrated(probability: np.ndarray, purpose: str, seed: int) -> np.ndarray:
+    """Draw for each resample whether statements of these probabilities (n,) are correct,
+    if they are calibrated: (resamples, n) bool."""
+    draws = open_stream(seed, "blind", purpose, 0)
+    return draws.random((_RESAMPLES, len(probability))) < probability
 
 
 def compute_calibration_error(
@@ -350,8 +356,8 @@ def compute_largest_bin_error(
 
 
 def find_largest_bin_error(rows: pd.DataFrame) -> dict[str, Any]:
-    """Find the largest error of a bin of stated cases. The errors of its bins by chance
-    are its uncertainty."""
+    """Find the largest error of a bin of stated cases. It has no interval;
+    `simulate_largest_bin_error` says how large it is by chance."""
     error = compute_largest_bin_error(
         rows.stated.to_numpy(float), rows.correct.to_numpy(bool)
     )
@@ -362,8 +368,7 @@ def simulate_largest_bin_error(rows: pd.DataFrame, seed: int) -> dict[str, Any]:
     """Simulate the largest error of a bin of calibrated verdicts that state the same
     probabilities: its median and the range of 95 %."""
     probability = rows.stated.to_numpy(float)
-    draws = open_stream(seed, "blind", "largest bin error by chance", 0)
-    outcomes = draws.random((_RESAMPLES, len(rows))) < probability
+    outcomes = _draw_calibrated(probability, "largest bin error by chance", seed)
     errors = compute_largest_bin_error(probability, outcomes)
     low, median, high = np.quantile(errors, [0.025, 0.5, 0.975]).tolist()
     return _describe_estimate(len(rows), median, low, high)
@@ -413,7 +418,7 @@ def tabulate_reliability(cases: pd.DataFrame) -> pd.DataFrame:
         "all": stated,
         "alarm": stated[stated.detected],
         "no alarm": stated[~stated.detected],
-        **dict(iter(stated.groupby("group"))),
+        **{str(group): rows for group, rows in stated.groupby("group")},
     }
     points = []
     for group, rows in rows_of_groups.items():
