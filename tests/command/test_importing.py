@@ -43,6 +43,24 @@ def test_a_dh_table_becomes_a_robot_file_in_its_units_and_its_notation(
     assert read_robot(output).name == "arm 1"
 
 
+def test_two_robot_files_become_one_of_two_arms(elastocal, tmp_path):
+    left = tmp_path / "left.yaml"
+    right = tmp_path / "right.yaml"
+    left.write_text("{name: left, chain: 'Tx(0.3) Rz(q1) Ty(0.5) [hand]'}")
+    right.write_text("{name: right, chain: 'Tx(-0.3) Rz(q1) Tz(q2) [tip]', ")
+    right.write_text(right.read_text() + "joint_limits_deg: [[-90, 90], [0, 1]]}")
+    output = tmp_path / "robot.yaml"
+    result = elastocal("import", "arms", left, right, "-o", output)
+    assert result.exit_code == 0
+    assert "right, seen from left: 3 joints" in result.output
+    assert "weights are not modelled" in result.output
+    assert "Ty(-0.5) Rz(-q1) Tx(-0.3) Tx(-0.3) Rz(q2) Tz(q3)" in output.read_text()
+    assert read_robot(output).base_moves
+    refusal = elastocal("import", "arms", right, left, "-o", tmp_path / "other.yaml")
+    assert refusal.exit_code == 1
+    assert "slides" in str(refusal.exception)
+
+
 def test_a_urdf_becomes_a_robot_file_that_is_described(elastocal, tmp_path):
     urdf = written(tmp_path, *ARM)
     output = tmp_path / "robot.yaml"

@@ -87,7 +87,7 @@ def write_contacts(folder, document, rows, robots=ROBOTS):
     for name in names:
         empty = "" if name in ("kind", "feature") else 0.0
         table[name] = [row.get(name, empty) for row in rows]
-    write_campaign(folder, whole, table, 6, "csv")
+    write_campaign(folder, whole, table, angles.shape[1], "csv")
     return read_campaign_folder(folder, robots)
 
 

@@ -143,6 +143,38 @@ def dh(
 
 
 @importing.command(
+    epilog=format_example("elastocal import arms left.yaml right.yaml -o robot.yaml")
+)
+def arms(
+    carrier: Annotated[
+        Path, Argument(help="Robot file of the arm whose flange becomes the base.")
+    ],
+    arm: Annotated[
+        Path, Argument(help="Robot file of the other arm, with the same base frame.")
+    ],
+    *,
+    output: _Output,
+    force: _Force = False,
+) -> None:
+    """Make one robot file of two arms that touch each other.
+
+    Its chain begins at the flange of the first arm, passes the common base and ends at
+    the flange of the second arm. Measurements state the joint angles of the first arm,
+    then those of the second.
+    """
+    from elastocal.campaigns.reading import read_robot
+    from elastocal.exchange.robot_text import check_imported, refuse_existing
+    from elastocal.mechanics.robot_file import describe_robot
+    from elastocal.mechanics.two_arms import join_arms
+
+    refuse_existing(output, force=force)
+    document = describe_robot(join_arms(read_robot(carrier), read_robot(arm)))
+    note = "weights are not modelled, because gravity turns in the frame of a flange"
+    seen_from = f"seen from the flange of {carrier.name}"
+    _write_robot(check_imported(document, arm, seen_from, [note]), output)
+
+
+@importing.command(
     epilog=format_example(
         "elastocal import csv tracker.csv --folder campaigns/cell --target SMR1"
     )

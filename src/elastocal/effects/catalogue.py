@@ -39,10 +39,14 @@ def list_bundled_effects() -> dict[str, Effect]:
 
 
 def candidates_on(sites: Sites) -> dict[str, Candidate]:
-    """List every way in which an effect of the catalogue can act on a robot, by key."""
+    """List every way in which an effect of the catalogue can act on a robot, by key.
+
+    On a base that moves, the direction of gravity is unknown: no effect of it is listed.
+    """
     candidates = [
         candidate
         for effect in list_effects().values()
+        if not (sites.base_moves and effect.family == "gravity")
         for candidate in effect.candidates(sites)
     ]
     require_unique([candidate.key for candidate in candidates])

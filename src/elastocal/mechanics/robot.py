@@ -106,6 +106,9 @@ class Robot:
         the chain follow others, such as the mimic joints of a URDF.
     masses : in the order of the links; empty if none are known
     gravity_m_s2 : base axes
+    base_moves : bool
+        Whether joints of the chain move the base, as those of a second arm do. The
+        direction of gravity is then unknown, and weights are not modelled.
     gear_ratio : tuple, optional
         Turns of the motor for one turn of each joint, None for an unknown ratio.
     compensator : gravity compensator, if there is one
@@ -127,6 +130,7 @@ class Robot:
     reported_offset: np.ndarray
     masses: tuple[Mass, ...] = ()
     gravity_m_s2: tuple[float, ...] = STANDING
+    base_moves: bool = False
     gear_ratio: tuple[float | None, ...] | None = None
     compensator: Compensator | None = None
     payload_kg: float | None = None

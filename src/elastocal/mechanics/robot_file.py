@@ -106,6 +106,7 @@ def parse_robot(document: Mapping[str, Any], source: str = "robot") -> Robot:
         reported_offset=offset,
         masses=_parse_masses(document.get("masses", ()), n, source),
         gravity_m_s2=gravity,
+        base_moves=_parse_base(document, source),
         gear_ratio=_get_joint_entries(document, "gear_ratio", n, source, "one or null"),
         compensator=compensator,
         payload_kg=payload_kg,
@@ -147,12 +148,25 @@ def describe_robot(robot: Robot) -> dict[str, Any]:
         ]
     if robot.gravity_m_s2 != STANDING:
         document["gravity_m_s2"] = list(robot.gravity_m_s2)
+    if robot.base_moves:
+        document["base_moves"] = True
     document |= {
         "gear_ratio": robot.gear_ratio and list(robot.gear_ratio),
         "compensator": robot.compensator and dict(vars(robot.compensator)),
         "payload_kg": robot.payload_kg,
     }
     return {key: value for key, value in document.items() if value is not None}
+
+
+def _parse_base(document: Mapping[str, Any], source: str) -> bool:
+    """Return whether the base moves, and refuse weights if it does."""
+    moves = bool(document.get("base_moves", False))
+    for key in ("masses", "gravity_m_s2", "compensator"):
+        if moves and document.get(key):
+            problem = "a weight beside base_moves"
+            allowed = "no weight, because the direction of gravity is unknown"
+            raise InputError(source, key, problem, allowed)
+    return moves
 
 
 def parse_joint_limits(

@@ -68,7 +68,7 @@ class Sites:
     prismatic : whether each joint slides along its axis, in metres and newtons
     masses : of links, if the robot file states them
     gravity_m_s2 : base axes
-    gear_ratio, compensator, payload_kg : as in `Robot`
+    base_moves, gear_ratio, compensator, payload_kg : as in `Robot`
     compliance : n values
         As in `Robot`, with typical values for rigid joints: the scale of other elastic
         parts.
@@ -89,6 +89,7 @@ class Sites:
     prismatic: tuple[bool, ...]
     masses: tuple[Mass, ...] = ()
     gravity_m_s2: tuple[float, ...] = STANDING
+    base_moves: bool = False
     gear_ratio: tuple[float | None, ...] | None = None
     compensator: Compensator | None = None
     payload_kg: float | None = None
@@ -213,6 +214,7 @@ def build_sites(robot: Robot) -> Sites:
         robot.chain,
         masses=robot.masses,
         gravity_m_s2=robot.gravity_m_s2,
+        base_moves=robot.base_moves,
         gear_ratio=robot.gear_ratio,
         compensator=robot.compensator,
         payload_kg=robot.payload_kg,
