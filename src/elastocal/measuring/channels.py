@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 _KEY = "features"
 _DISTANCES = "distances"
-# Keys of features that state a length.
-_LENGTH_KEYS = ("position_m", "radius_m")
 # Upper bound on the places that are located by the distances between them.
 _MOST_PLACES_BY_DISTANCES = 3
 
@@ -95,10 +93,9 @@ class MeasuringPlan:
 
         `numbers` are the numbers (M, r) of all rows, m or rad, zero for a contact.
         """
+        by_name = {kind.name: kind for kind in self.kinds}
         has_stated_length = any(
-            feature.stated.get(key, UNKNOWN) != UNKNOWN
-            for feature in self.features
-            for key in _LENGTH_KEYS
+            by_name[feature.kind].states_length(feature) for feature in self.features
         )
         are_contacts = all(kind.is_contact for kind in self.kinds)
         return has_stated_length or not are_contacts or bool(numbers.any())

@@ -194,6 +194,10 @@ class Kind:
         """List the K unknowns of a feature, in the order of steps of a fit."""
         return ()
 
+    def states_length(self, feature: Feature) -> bool:
+        """Whether the feature states a length that shows a common scale of the robot."""
+        return read_vector(feature, "position_m") is not None
+
     def locate(self, feature: Feature) -> np.ndarray | None:
         """Return where the target of every row is, (3,) m in the session, if the feature
         states it."""

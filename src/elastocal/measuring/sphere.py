@@ -23,8 +23,13 @@ from elastocal.measuring.protocol import (
     measure_distances,
     predict_along,
     read_number,
+    read_std,
     read_vector,
 )
+
+# Contacts with lengths that are less exact than those of a robot, a millimetre in 2.5 m,
+# do not show its scale: N of them make it smaller by N times the variance of the scale.
+_EXACT_SHARE = 4e-4
 
 
 class Sphere(Kind):
@@ -51,6 +56,19 @@ class Sphere(Kind):
         return (
             *describe_point(feature),
             describe_number(feature, "radius_m", "radius_std_m"),
+        )
+
+    def states_length(self, feature: Feature) -> bool:
+        """Whether centre or radius are known to a smaller share than the robot."""
+        centre = read_vector(feature, "position_m")
+        radius_m = read_number(feature, "radius_m")
+        lengths = [
+            (0.0 if centre is None else float(np.linalg.norm(centre)), "std_m", 3),
+            (radius_m or 0.0, "radius_std_m", 1),
+        ]
+        return any(
+            read_std(feature, std_key, count).max() < _EXACT_SHARE * length_m
+            for length_m, std_key, count in lengths
         )
 
     def start(
