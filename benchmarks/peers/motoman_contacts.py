@@ -1,13 +1,14 @@
-"""Calibrate an arm of a Motoman from touches of planes alone, and judge it by a Leica.
+"""Calibrate an arm of a Motoman from contacts alone, and judge it by a Leica.
 
 Usage: python benchmarks/peers/motoman_contacts.py FOLDER, a clone of
 ctu-vras/multirobot-calibration at commit a20f0454, from the top of this repository.
 
 The right arm touched two horizontal tables and a wall with the faces of an icosahedron,
-whose centre is then at a constant distance from the plane. Three sets of measurements of
-a laser tracker judge it, after a fit of the tracker's frame and of the reflector's offset:
-a grid, other touches of the same planes, and poses all over the workspace half a year
-later. The toolbox itself stored one calibration of this arm, from contacts of both arms.
+whose centre is then at a constant distance from the plane, and the icosahedron of the
+left arm. Three sets of measurements of a laser tracker judge it, after a fit of the
+tracker's frame and of the reflector's offset: a grid, other touches of the same planes,
+and poses all over the workspace half a year later. The toolbox itself stored one
+calibration of this arm, from contacts of both arms.
 """
 
 from __future__ import annotations
@@ -20,17 +21,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy
+import pandas as pd
 from run import summarize
 
 from elastocal.application.identifiability import predict_tip_error
 from elastocal.campaigns.campaign import GEOMETRY, tabulate_measurements
 from elastocal.campaigns.campaign_folder import read_campaign_folder
 from elastocal.campaigns.holdout import number_close_points
-from elastocal.campaigns.importers import PublicMeasurements, read_importers
-from elastocal.campaigns.measurements import (
-    tabulate_single_measurements,
+from elastocal.campaigns.importers import (
+    Importer,
+    PublicMeasurements,
+    read_importers,
 )
+from elastocal.campaigns.measurements import tabulate_single_measurements
 from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.writing import write_campaign
 from elastocal.diagnosis.diagnose import diagnose
@@ -39,6 +42,7 @@ from elastocal.fitting.cases import build_case
 from elastocal.fitting.least_squares import Fit
 from elastocal.fitting.model import Case, compute_residual_vectors, evaluate_conditions
 from elastocal.fitting.noise import estimate_noise, fit_declared_model
+from elastocal.fitting.observations import Observations
 from elastocal.io.documents import read_document
 from elastocal.loop.loading import read_described_campaign
 from elastocal.loop.whole import read_cases
@@ -46,73 +50,105 @@ from elastocal.mechanics.kinematics import compute_poses
 from elastocal.validation.transfer import transfer_fit
 
 ROBOTS = Path("config/robots")
-ROBOT = "motoman_right_arm"
+IMPORTERS = Path("config/public_data.yaml")
 DATA = Path("UserData/Robots/Motoman/Dataset/leica_dataset")
 STORED = Path("UserData/Results/self-touch-motoman/kin-rep1-pert1.txt")
 PLANES = ("wall", "higher", "lower")
 RUNS = (1, 2)
-# The wall was set up anew between its two runs: repeated touches differ by 0.8 mm, those
-# of the tables by 0.05 mm.
-MOVED = ("wall",)
-# Distance of the centre of the icosahedron from the flange (loadMotoman.m), m; a fit
-# estimates it, and this value only sorts touches by place.
-CENTRE_M = (0.0, 0.0, 0.354)
 # Touches of one place are within this distance of each other, m; places are 0.1 m apart.
 SAME_PLACE_M = 0.03
 # A place that was touched fewer times determines its own height and little else.
 FEWEST_TOUCHES = 3
 # A plane through places of the nominal robot, which is off by a few mm in 0.4 m.
 NORMAL_STD_RAD = 0.005
+# Joint angles of the left arm while the tracker measured the right one, rad.
+PARKED_RAD = (1.5, 0.0, 0.0, 0.0, 0.0, 0.0)
 JOINTS = 6
 REPLICATES = 1000
 SEED = 1
 
 
+@dataclass(frozen=True)
+class Variant:
+    """What a calibration is made from.
+
+    Attributes
+    ----------
+    label : name in the output.
+    importer : importer of the contacts in ``config/public_data.yaml``.
+    by_place : whether each place of a plane is a plane of its own with a known normal,
+        so that tables need not be flat.
+    """
+
+    label: str
+    importer: str
+    by_place: bool
+
+    def __str__(self) -> str:
+        return self.label
+
+
+VARIANTS = (
+    Variant("planes", "motoman_planes", by_place=False),
+    Variant("places", "motoman_planes", by_place=True),
+    Variant("planes and other arm", "motoman_contacts", by_place=False),
+    Variant("places and other arm", "motoman_contacts", by_place=True),
+)
+
+
 def main(folder: Path) -> None:
     """Print a line for each model and each set of measurements of the tracker."""
+    importers = read_importers(IMPORTERS)
     with tempfile.TemporaryDirectory() as scratch_name:
         scratch = Path(scratch_name)
-        judges = read_judges(folder / DATA)
+        judges = read_judges(folder / DATA, importers["motoman"])
         print("model; judge; poses; RMS (95 %), mm; largest, mm")
-        cases = {}
-        for name, measured in judges.items():
-            bound = scratch / f"{name}_bound"
-            write_positions(bound, measured, ROBOT, [*GEOMETRY])
-            training, held_out = read_cases(bound, ROBOTS)
-            report("geometry from this Leica", name, fit(training), training, held_out)
-            toolbox = scratch / f"{name}_toolbox"
-            write_positions(toolbox, measured, "robot.yaml", [])
-            write_stored_robot(folder / STORED, toolbox / "robot.yaml")
-            case = read_whole_case(toolbox)
-            report("toolbox, stored", name, fit(case), case, case)
-            drawing = scratch / name
-            write_positions(drawing, measured, ROBOT, [])
-            cases[name] = read_whole_case(drawing)
-            report("drawing", name, fit(cases[name]), cases[name], cases[name])
-        for label, by_place in (("planes", False), ("places", True)):
-            write_contacts(scratch / label, folder / DATA, by_place=by_place)
-            contacts = read_whole_case(scratch / label)
-            models = {
-                f"{label}, geometry": fit(contacts),
-                f"{label}, diagnosis": diagnose(contacts, Settings(), SEED).final,
+        report_references(folder, scratch, judges)
+        for variant in VARIANTS:
+            importer = importers[variant.importer]
+            contacts = write_contacts(scratch, folder / DATA, importer, variant)
+            cases = {
+                name: write_judge(scratch, f"{variant} {name}", measured, importer)
+                for name, measured in judges.items()
             }
+            models = {
+                f"{variant}, geometry": fit(contacts),
+                f"{variant}, diagnosis": diagnose(contacts, Settings(), SEED).final,
+            }
+            touches_of_planes = select_planes(contacts)
             for model, fitted in models.items():
-                error_m = predict_tip_error(fitted, contacts.observations)
+                error_m = predict_tip_error(fitted, touches_of_planes)
                 if error_m is not None:
                     print(f"{model}; predicted by the fit itself; {1e3 * error_m:.3f}")
                 for name, case in cases.items():
                     report(model, name, fitted, contacts, case)
 
 
-def read_table(path: Path) -> np.ndarray:
-    """Read a row (P, 26) of each pose, which repeats for each camera image."""
-    rows = scipy.io.loadmat(path)["dataset"]
-    return rows[np.unique(rows[:, 0], return_index=True)[1]]
+def report_references(
+    folder: Path, scratch: Path, judges: dict[str, PublicMeasurements]
+) -> None:
+    """Print lines for the drawing, the stored result of the toolbox, and the geometry
+    that is fitted to the tracker itself."""
+    (right_arm,) = read_importers(IMPORTERS)["motoman"].robots
+    for name, measured in judges.items():
+        bound = scratch / f"{name}_bound"
+        write_positions(bound, measured, right_arm, [*GEOMETRY])
+        training, held_out = read_cases(bound, ROBOTS)
+        report("geometry from this Leica", name, fit(training), training, held_out)
+        toolbox = scratch / f"{name}_toolbox"
+        write_positions(toolbox, measured, "robot.yaml", [])
+        write_stored_robot(folder / STORED, right_arm, toolbox / "robot.yaml")
+        case = read_whole_case(toolbox)
+        report("toolbox, stored", name, fit(case), case, case)
+        drawing = scratch / name
+        write_positions(drawing, measured, right_arm, [])
+        case = read_whole_case(drawing)
+        report("drawing", name, fit(case), case, case)
 
 
-def read_judges(data: Path) -> dict[str, PublicMeasurements]:
+def read_judges(data: Path, importer: Importer) -> dict[str, PublicMeasurements]:
     """Read the positions of the reflector, by the name of their set."""
-    read = read_importers(Path("config/public_data.yaml"))["motoman"].read
+    read = importer.read
     touches = [
         read(data / f"leica_{plane}_table{run}_5x5_dataset.mat")
         for plane in PLANES
@@ -127,8 +163,9 @@ def read_judges(data: Path) -> dict[str, PublicMeasurements]:
     }
 
 
-def write_stored_robot(path: Path, destination: Path) -> None:
-    """Write the Denavit-Hartenberg parameters that the toolbox stored as a robot file."""
+def write_stored_robot(path: Path, robot: str, destination: Path) -> None:
+    """Write the Denavit-Hartenberg parameters that the toolbox stored as the file of a
+    robot."""
     _, _, right_arm = path.read_text(encoding="utf-8").partition("rightArm")
     lines = right_arm.splitlines()[1 : JOINTS + 2]
     lengths_m = {}
@@ -143,7 +180,7 @@ def write_stored_robot(path: Path, destination: Path) -> None:
         chain.append(
             f"{turn} Rz({offset_deg:.9f}deg) Tz(d{joint}) Tx(a{joint}) Rx({alpha_deg:.9f}deg)"
         )
-    document = read_document(ROBOTS / f"{ROBOT}.yaml")
+    document = read_document(ROBOTS / f"{robot}.yaml")
     document |= {"chain": " ".join([*chain, "[6DoF]"]), "lengths_m": lengths_m}
     destination.write_text(json.dumps(document), encoding="utf-8")
 
@@ -162,78 +199,94 @@ def write_positions(
     write_folder(folder, document, table, "reflector", robot, declared)
 
 
-@dataclass(frozen=True)
-class Touches:
-    """N touches of one plane by the arm without a reflector.
+def write_judge(
+    scratch: Path, name: str, measured: PublicMeasurements, importer: Importer
+) -> Case:
+    """Write positions of the reflector as a campaign of the robot of an importer, and
+    return its case."""
+    (robot,) = importer.robots
+    other_joints = read_robot(ROBOTS / f"{robot}.yaml").joints - JOINTS
+    parked = np.tile(PARKED_RAD[:other_joints], (len(measured.angles), 1))
+    angles = np.concatenate([parked, measured.angles], axis=1)
+    folder = scratch / name.replace(" ", "_")
+    write_positions(folder, measured._replace(angles=angles), robot, [])
+    return read_whole_case(folder)
 
-    Attributes
-    ----------
-    angles : (N, 6) joint angles, rad.
-    normal : (3,) normal of the plane through the nominal centres of the icosahedron.
-    run : (N,) number of the run if the plane was moved between them; otherwise 0.
-    place : (N,) number of the place that was touched.
+
+def write_contacts(
+    scratch: Path, data: Path, importer: Importer, variant: Variant
+) -> Case:
+    """Write contacts as a campaign, and return the case of all of them."""
+    folder = scratch / str(variant).replace(" ", "_")
+    paths = [data / f"{name}.mat" for name in importer.files]
+    importer.write_campaign(paths, folder, ROBOTS, folder.name)
+    if variant.by_place:
+        split_by_place(folder)
+    return read_whole_case(folder)
+
+
+def split_by_place(folder: Path) -> None:
+    """Make each place of a plane a plane of its own with a known normal.
+
+    Places and normals are those of the nominal robot.
     """
+    document = read_document(folder / "campaign.yaml")
+    table = pd.read_parquet(folder / "measurements.parquet")
+    centre_m = locate_centres(document, table)
+    whole_features = document["features"]
+    features = {}
+    for feature, keys in whole_features.items():
+        rows = np.flatnonzero(table["feature"] == feature)
+        if keys["kind"] != "plane":
+            features[feature] = keys
+            continue
+        normal = find_normal(centre_m[rows])
+        place = number_close_points(centre_m[rows], SAME_PLACE_M)
+        for number in range(place.max() + 1):
+            members = rows[place == number]
+            name = f"{feature}_{number}"
+            if len(members) < FEWEST_TOUCHES:
+                name = ""
+            else:
+                features[name] = {
+                    "kind": "plane",
+                    "normal": normal.tolist(),
+                    "normal_std_rad": NORMAL_STD_RAD,
+                }
+            table.loc[members, "feature"] = name
+    table = table[table["feature"] != ""]
+    columns = {name: column.to_numpy() for name, column in table.items()}
+    joints = sum(name.startswith("q") for name in columns)
+    write_campaign(folder, document | {"features": features}, columns, joints)
 
-    angles: np.ndarray
-    normal: np.ndarray
-    run: np.ndarray
-    place: np.ndarray
 
-
-def read_touches(data: Path, plane: str) -> Touches:
-    """Read the touches of a plane and sort them by place."""
-    robot = read_robot(ROBOTS / f"{ROBOT}.yaml")
-    runs = [
-        read_table(data / f"no_leica_{plane}_table{run}_5x5_dataset.mat")[:, 7:13]
-        for run in RUNS
-    ]
-    angles = np.concatenate(runs)
+def locate_centres(document: dict[str, Any], table: pd.DataFrame) -> np.ndarray:
+    """Locate the centres (N, 3), m, of the icosahedron at all contacts of the nominal
+    robot."""
+    robot = read_robot(ROBOTS / f"{document['robot']}.yaml")
+    angles = table.filter(regex=r"^q\d+$").to_numpy()
     coordinates = robot.chain.at(robot.model_angles(angles))
     flange_m, rotation = compute_poses(
         robot.chain, coordinates, robot.chain.end_effector
     )
-    centre_m = flange_m + rotation @ np.array(CENTRE_M)
-    run = np.repeat(RUNS, [len(angles) for angles in runs])
-    return Touches(
-        angles,
-        find_normal(centre_m, flange_m),
-        run if plane in MOVED else np.zeros_like(run),
-        number_close_points(centre_m, SAME_PLACE_M),
-    )
+    (target,) = document["targets"].values()
+    return flange_m + rotation @ np.array(target["offset_m"])
 
 
-def write_contacts(folder: Path, data: Path, *, by_place: bool) -> None:
-    """Write the touches of all planes as a campaign.
-
-    With `by_place` each place of a plane is a plane of its own with a known normal, so
-    that tables need not be flat.
-    """
-    angles = []
-    names: list[str] = []
-    features: dict[str, dict[str, Any]] = {}
-    for plane in PLANES:
-        touches = read_touches(data, plane)
-        place = touches.place if by_place else np.zeros_like(touches.place)
-        for run, number in np.unique(np.stack([touches.run, place]), axis=1).T:
-            is_here = (touches.run == run) & (place == number)
-            if is_here.sum() < FEWEST_TOUCHES:
-                continue
-            name = f"{plane}_{run}_{number}"
-            features[name] = {"normal": touches.normal.tolist()}
-            if by_place:
-                features[name]["normal_std_rad"] = NORMAL_STD_RAD
-            angles.append(touches.angles[is_here])
-            names += [name] * int(is_here.sum())
-    table = tabulate_single_measurements(np.concatenate(angles), "centre")
-    table["feature"] = np.array(names)
-    document = {"measured": "plane", "frame": "base", "features": features}
-    write_folder(folder, document, table, "centre", ROBOT, [*GEOMETRY])
+def find_normal(points_m: np.ndarray) -> np.ndarray:
+    """Find the normal (3,) of the plane through points (N, 3)."""
+    normal: np.ndarray = np.linalg.svd(points_m - points_m.mean(axis=0))[2][-1]
+    return normal
 
 
-def find_normal(centre_m: np.ndarray, flange_m: np.ndarray) -> np.ndarray:
-    """Find the normal (3,) of the plane through points (N, 3), towards the flanges."""
-    normal = np.linalg.svd(centre_m - centre_m.mean(axis=0))[2][-1]
-    return normal * np.sign((flange_m - centre_m).mean(axis=0) @ normal)
+def select_planes(case: Case) -> Observations:
+    """Select the contacts with planes, at which one arm stands still."""
+    planes = [
+        index
+        for index, channel in enumerate(case.campaign.measuring.channels)
+        if channel.kind.name == "plane"
+    ]
+    return case.select(np.isin(case.campaign.measurements.channel, planes)).observations
 
 
 def write_folder(
@@ -254,7 +307,8 @@ def write_folder(
         "holdout": {"fraction": 0.3, "seed": SEED},
         **document,
     }
-    write_campaign(folder, whole, table, JOINTS)
+    joints = sum(name.startswith("q") for name in table)
+    write_campaign(folder, whole, table, joints)
 
 
 def read_whole_case(folder: Path) -> Case:

@@ -32,6 +32,7 @@ from elastocal.campaigns.importers import (
 )
 from elastocal.campaigns.reading import read_campaign, read_robot
 from elastocal.io.documents import read_document
+from elastocal.mechanics.two_arms import join_arms
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"
 ROBOTS = CONFIG / "robots"
@@ -382,6 +383,65 @@ def test_keys_of_tables_are_refused_beside_sockets(tmp_path, key, value):
         read_importers(path)
 
 
+@pytest.fixture
+def contacts(tmp_path):
+    """Return files of the contacts of two arms, with two rows for each pose."""
+    names = ["no_leica_wall_table1_5x5_dataset", "no_leica_self_upper1_4x4_dataset"]
+    paths = [tmp_path / f"{name}.mat" for name in names]
+    for number, path in enumerate(paths):
+        rows = np.full((40, 26), np.nan)
+        rows[:, 0] = np.repeat(np.arange(20), 2)
+        rows[:, 6:19] = 0.1 * (number + np.arange(13) + rows[:, :1])
+        scipy.io.savemat(path, {"dataset": rows})
+    return paths
+
+
+def test_contacts_of_two_arms_become_rows_of_their_features(contacts, tmp_path):
+    folder = tmp_path / "mine"
+    IMPORTERS["motoman_contacts"].write_campaign(contacts, folder, ROBOTS, "mine")
+    campaign = read_campaign(read_campaign_folder(folder, ROBOTS))
+    # The left arm, which comes first, has the last six columns of the file.
+    np.testing.assert_allclose(
+        IMPORTERS["motoman_contacts"].read(contacts[1]).angles[0],
+        [0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7],
+    )
+    assert len(campaign.measurements) == 40
+    assert [feature.name for feature in campaign.measuring.features] == [
+        "wall_1",
+        "other_arm",
+    ]
+    assert campaign.measuring.features[1].stated["radius_m"] == 0.116
+
+
+def test_contacts_with_planes_are_those_of_the_right_arm(contacts, tmp_path):
+    planes = replace(IMPORTERS["motoman_planes"], noise={"position_m": 3e-5})
+    planes.write_campaign(contacts[:1], tmp_path / "mine", ROBOTS, "mine")
+    campaign = read_campaign(read_campaign_folder(tmp_path / "mine", ROBOTS))
+    assert campaign.noise == {"position_m": 3e-5}
+    np.testing.assert_allclose(
+        campaign.measurements.joint_angles[0], [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
+    )
+    with refused(contacts[1], "name", "no_leica_self", "no_leica_wall"):
+        planes.write_campaign(contacts, tmp_path / "other", ROBOTS, "other")
+
+
+def test_the_two_arms_of_the_motoman_are_its_arms_joined():
+    arms = [
+        read_robot(ROBOTS / f"motoman_{side}_arm.yaml") for side in ("left", "right")
+    ]
+    joined = join_arms(*arms)
+    robot = read_robot(ROBOTS / "motoman_two_arms.yaml")
+    assert robot.chain.points == joined.chain.points
+    assert robot.base_moves
+    np.testing.assert_array_equal(robot.reported_matrix, joined.reported_matrix)
+    for transform, expected in zip(
+        robot.chain.transforms, joined.chain.transforms, strict=True
+    ):
+        assert transform == replace(
+            expected, constant=pytest.approx(expected.constant, abs=1e-12)
+        )
+
+
 def test_folds_hold_out_poses_of_recordings_in_sockets_too(recordings, tmp_path):
     folder = tmp_path / "mine"
     IMPORTERS["mukca_panda"].write_campaign(
@@ -421,7 +481,7 @@ def keep_one_campaign(config, name="mine"):
             "importer",
             [
                 "'mine'",
-                "fanuc_static, fanuc_cpa, fanuc_joint, jacobi, motoman, ur10_ipa,",
+                "fanuc_static, fanuc_cpa, fanuc_joint, jacobi, motoman, motoman_planes,",
             ],
         ),
     ],

@@ -11,7 +11,7 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,7 +26,10 @@ from elastocal.campaigns.campaign_folder import (
     read_campaign_folder,
 )
 from elastocal.campaigns.holdout import number_close_points
-from elastocal.campaigns.measurements import name_joint_columns
+from elastocal.campaigns.measurements import (
+    name_joint_columns,
+    tabulate_single_measurements,
+)
 from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.socket_recordings import (
     SOCKET_DISTANCE_M,
@@ -252,6 +255,21 @@ def _read_motoman(path: str | Path) -> PublicMeasurements:
     return PublicMeasurements(rows[:, 7:13], {"reflector": rows[:, 19:22]}, {})
 
 
+def _read_motoman_contacts(path: str | Path) -> PublicMeasurements:
+    """Read the joint angles (N, 12) of the left and the right arm at each contact, from
+    a file with a row for each camera image of a pose."""
+    rows = scipy.io.loadmat(path)["dataset"]
+    rows = rows[np.unique(rows[:, 0], return_index=True)[1]]
+    angles = np.concatenate([rows[:, 13:19], rows[:, 7:13]], axis=1)
+    return PublicMeasurements(angles, {}, {})
+
+
+def _read_motoman_planes(path: str | Path) -> PublicMeasurements:
+    """Read the joint angles (N, 6) of the right arm, while the left arm stands still."""
+    both = _read_motoman_contacts(path)
+    return both._replace(angles=both.angles[:, _JOINTS_OF_FIRST_ROBOT:])
+
+
 @dataclass(frozen=True)
 class _ImportedCampaign:
     """Contents of a campaign's folder.
@@ -268,7 +286,12 @@ class _ImportedCampaign:
     joints: int
 
 
-_MAT_FILES = {"fanuc_static": _read_fanuc_static, "motoman": _read_motoman}
+_MAT_FILES = {
+    "fanuc_static": _read_fanuc_static,
+    "motoman": _read_motoman,
+    "motoman_planes": _read_motoman_planes,
+    "motoman_contacts": _read_motoman_contacts,
+}
 
 
 @dataclass(frozen=True)
@@ -403,6 +426,64 @@ class SocketImporter(Importer):
         return _ImportedCampaign(document, table, joints)
 
 
+@dataclass(frozen=True)
+class ContactImporter(Importer):
+    """Writes campaigns of a target that touches planes and spheres, from files of joint
+    angles.
+
+    Attributes
+    ----------
+    targets : the only target as ``campaign.yaml`` has it, by its name.
+    features : keys of each feature as ``campaign.yaml`` has them, and ``files``: names
+        of the files with its contacts.
+    """
+
+    targets: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    features: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+    def _read_campaign(
+        self, paths: Sequence[str | Path], robots_folder: str | Path, name: str
+    ) -> _ImportedCampaign:
+        """Read files of contacts, in the frame of the robot's base."""
+        angles = []
+        names = []
+        for path in paths:
+            read = self.read(path).angles
+            angles.append(read)
+            names += [self._find_feature(path)] * len(read)
+        contacts = np.concatenate(angles)
+        (target,) = self.targets
+        table = tabulate_single_measurements(contacts, target)
+        table["feature"] = np.array(names)
+        features = {}
+        for feature in dict.fromkeys(names):
+            keys = self.features[feature].items()
+            features[feature] = {key: value for key, value in keys if key != "files"}
+        kinds = dict.fromkeys(keys["kind"] for keys in features.values())
+        document: dict[str, Any] = {
+            "campaign": name,
+            "robot": self.robots[0],
+            "measured": [*kinds],
+            "frame": "base",
+            "targets": {target: dict(self.targets[target])},
+            "features": features,
+            "compliance": "nominal",
+            "declared": [*GEOMETRY],
+        }
+        if self.noise is not None:
+            document["noise"] = dict(self.noise)
+        return _ImportedCampaign(document, table, contacts.shape[1])
+
+    def _find_feature(self, path: str | Path) -> str:
+        """Find the feature that the contacts of a file touch, by the file's name."""
+        stem = Path(path).stem
+        for feature, keys in self.features.items():
+            if stem in keys["files"]:
+                return feature
+        allowed = [name for keys in self.features.values() for name in keys["files"]]
+        raise InputError(path, "name", repr(stem), ", ".join(allowed))
+
+
 def _tabulate(
     measured: PublicMeasurements, same_pose_rad: float
 ) -> dict[str, np.ndarray]:
@@ -463,6 +544,11 @@ def read_importers(path: Path) -> dict[str, Importer]:
             )
             continue
         read = _find_reader(name, entry, parts, path)
+        if "contacts" in entry:
+            importers[name] = ContactImporter(
+                files, read, tuple(robots), **options, **entry["contacts"]
+            )
+            continue
         importers[name] = Importer(files, read, tuple(robots), **options, parts=parts)
     return importers
 
