@@ -16,7 +16,7 @@ from elastocal.diagnosis.search import screen_terms
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.cases import build_case
 from elastocal.fitting.features import state_features
-from elastocal.fitting.least_squares import fit_model
+from elastocal.fitting.least_squares import IterationOptions, fit_robustly
 from elastocal.fitting.model import (
     Estimate,
     build_nominal_model,
@@ -213,9 +213,14 @@ def find_rejected_rows(case: Case, facts: Mapping[str, Any]) -> np.ndarray:
 
 
 def refit_step(case: Case, step: Mapping[str, Any]) -> Fit:
-    """Fit the model of a step of diagnosis.json again, starting at its estimate."""
+    """Fit the model of a step of diagnosis.json again, starting at its estimate.
+
+    All observations are fitted from the first step on. Fits to samples, with which
+    `fit_model` starts, would only lead away from an estimate that has converged.
+    """
     model, estimate = restore_step_model(case, step)
-    return fit_model(model, case.observations, parse_noise(step), estimate)
+    options = IterationOptions(reweight_first_step=True)
+    return fit_robustly(model, case.observations, parse_noise(step), estimate, options)
 
 
 def restore_step_model(case: Case, step: Mapping[str, Any]) -> tuple[Model, Estimate]:
