@@ -45,6 +45,8 @@ from elastocal.residual_model.selection import (
 from elastocal.validation.transfer import find_beyond_campaign, find_larger_loads
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.noise import Noise
@@ -389,16 +391,26 @@ def compute_pose_sensitivities(
     Returns (N, 6, P): displacement and rotation, m and rad, base axes. Arguments as in
     `predict_poses`.
     """
+    count = len(reported_angles)
+    sensitivities = np.empty((count, 6, len(calibrated.covariance)))
+    blocks = generate_pose_sensitivities(calibrated, reported_angles, wrench)
+    for chunk, block in zip(split_into_chunks(count), blocks, strict=True):
+        sensitivities[chunk] = block
+    return sensitivities
+
+
+def generate_pose_sensitivities(
+    calibrated: CalibratedRobot, reported_angles: np.ndarray, wrench: np.ndarray
+) -> Iterator[np.ndarray]:
+    """Generate the result of `compute_pose_sensitivities` in blocks of consecutive
+    poses, so that not all of them are in memory at once."""
     model = calibrated.model
     estimate = calibrated.estimate
-    count = len(reported_angles)
-    sensitivities = np.zeros((count, 6, len(calibrated.covariance)))
-    for chunk in split_into_chunks(count):
+    for chunk in split_into_chunks(len(reported_angles)):
         states = build_states(calibrated, reported_angles[chunk], wrench[chunk])
         around = evaluate_conditions(model, estimate, states)
         linearization = linearize(model, estimate, build_observations(states), around)
-        sensitivities[chunk] = linearization.sensitivities
-    return sensitivities
+        yield linearization.sensitivities
 
 
 def find_extrapolated(

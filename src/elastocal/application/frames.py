@@ -33,6 +33,8 @@ FRAMES = {
 # Parameters of a placement: shift and rotation of the base, offset and rotation at the
 # end effector, with three components each.
 PLACEMENT_PARAMETERS = 12
+# The first of these move the end effector; the others only turn it.
+_MOVING_PARAMETERS = 9
 # Number of poses whose fields of displacements are copied at once.
 _CHUNK = 500
 
@@ -123,40 +125,49 @@ def fit_placement(
     -------
     (12, K) fitted parameters, m and rad.
     """
-    fitted = np.zeros((PLACEMENT_PARAMETERS, displacements.shape[2]))
-    positions = slice(0, 3), 0, 9
-    orientations = slice(3, 6), 9, PLACEMENT_PARAMETERS
-    for rows, first, last in (positions, orientations):
-        parameters = np.flatnonzero(free[first:last]) + first
-        if len(parameters):
-            design = columns[:, rows, parameters]
-            residuals = (
-                displacements[chunk, rows] - columns[chunk, rows] @ fitted
-                for chunk in _split_poses(len(design))
-            )
-            fitted[parameters] = _solve_least_squares(design, residuals)
+    blocks = (displacements[chunk] for chunk in _split_poses(len(displacements)))
+    return fit_placement_to_blocks(columns, blocks, free)
+
+
+def fit_placement_to_blocks(
+    columns: np.ndarray, blocks: Iterable[np.ndarray], free: np.ndarray
+) -> np.ndarray:
+    """Fit a placement as `fit_placement`, to fields of which only some poses are in
+    memory at once.
+
+    Parameters
+    ----------
+    columns, free : as of `fit_placement`.
+    blocks : the fields of consecutive poses, (n, 6, K) each, N poses in all.
+    """
+    moving = np.flatnonzero(free[:_MOVING_PARAMETERS])
+    turning = np.flatnonzero(free[_MOVING_PARAMETERS:]) + _MOVING_PARAMETERS
+    from_positions = _invert_design(columns[:, :3, moving])
+    from_rotations = _invert_design(columns[:, 3:, turning])
+    moved = []
+    turned = []
+    first = 0
+    for block in blocks:
+        chunk = slice(first, first + len(block))
+        moved.append(np.tensordot(from_positions[:, chunk], block[:, :3], axes=2))
+        turned.append(np.tensordot(from_rotations[:, chunk], block[:, 3:], axes=2))
+        first = chunk.stop
+    moved_sum = np.sum(moved, axis=0)
+    fitted = np.zeros((PLACEMENT_PARAMETERS, moved_sum.shape[1]))
+    fitted[moving] = moved_sum
+    # The rotation of the base, which positions determine, turns the end effector too.
+    turned_by_base = np.tensordot(from_rotations, columns[:, 3:, moving], axes=2)
+    fitted[turning] = np.sum(turned, axis=0) - turned_by_base @ moved_sum
     return fitted
 
 
-def _solve_least_squares(
-    design: np.ndarray, right_sides: Iterable[np.ndarray]
-) -> np.ndarray:
-    """Solve least-squares problems (p, K) of one design (N, 3, p).
-
-    The right sides (N, 3, K) come in blocks of `_split_poses`, so that no copy of all of
-    them is in memory.
-    """
-    rows = design.shape[0] * design.shape[1]
+def _invert_design(design: np.ndarray) -> np.ndarray:
+    """Pseudoinverse (p, N, 3) of a design (N, 3, p) of least squares."""
+    poses, rows, parameters = design.shape
     # Singular values below the rounding of the largest one count as zero.
-    rounding = np.finfo(float).eps * max(rows, design.shape[2])
-    inverse = np.linalg.pinv(design.reshape(rows, -1), rcond=rounding)
-    inverse = inverse.reshape(-1, *design.shape[:2])
-    products = [
-        np.tensordot(inverse[:, chunk], right, axes=2)
-        for chunk, right in zip(_split_poses(len(design)), right_sides, strict=True)
-    ]
-    solution: np.ndarray = np.sum(products, axis=0)
-    return solution
+    rounding = np.finfo(float).eps * max(poses * rows, parameters)
+    flat = design.reshape(poses * rows, parameters)
+    return np.linalg.pinv(flat, rcond=rounding).reshape(parameters, poses, rows)
 
 
 def _split_poses(count: int) -> list[slice]:

@@ -32,6 +32,8 @@ from elastocal.mechanics.kinematics import compute_pose_differences, compute_pos
 from elastocal.residual_model.selection import is_commanded
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from elastocal.application.frames import Scope
     from elastocal.effects.conditions import Conditions
     from elastocal.effects.protocol import Candidate
@@ -93,9 +95,16 @@ class LeftOutEffects:
         rad, base axes.
         """
         fields = np.empty((len(states), 6, 1 + self.covariance_factor.shape[1]))
-        for chunk in split_into_chunks(len(states)):
-            fields[chunk] = self._compute_fields_of_chunk(states.select(chunk))
+        chunks = split_into_chunks(len(states))
+        for chunk, block in zip(chunks, self.generate_fields(states), strict=True):
+            fields[chunk] = block
         return fields
+
+    def generate_fields(self, states: States) -> Iterator[np.ndarray]:
+        """Generate the result of `compute_fields` in blocks of consecutive states, so
+        that not all of them are in memory at once."""
+        for chunk in split_into_chunks(len(states)):
+            yield self._compute_fields_of_chunk(states.select(chunk))
 
     def _compute_fields_of_chunk(self, states: States) -> np.ndarray:
         model = self.model

@@ -13,7 +13,7 @@ from elastocal.application.calibrated import (
     ResidualModel,
     calibrate_by_model,
     compute_nominal_poses,
-    compute_pose_sensitivities,
+    generate_pose_sensitivities,
     predict_poses,
 )
 from elastocal.application.frames import (
@@ -21,7 +21,7 @@ from elastocal.application.frames import (
     ROBOT,
     Scope,
     compute_placement_columns,
-    fit_placement,
+    fit_placement_to_blocks,
     select_free_parameters,
 )
 from elastocal.application.left_out import LeftOutEffects, is_left_out
@@ -36,7 +36,7 @@ from elastocal.fitting.noise import estimate_joint_repeatability
 from elastocal.mechanics.kinematics import compute_pose_differences
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.campaigns.campaign import Target
@@ -239,14 +239,14 @@ def determine_scope(
             rotation=_is_rotation_fitted(model),
         ),
     )
-    sensitivities = compute_pose_sensitivities(calibrated, commands, states.wrench)
+    sensitivities = generate_pose_sensitivities(calibrated, commands, states.wrench)
     before = compute_pose_differences(
         *compute_nominal_poses(robot, commands), position, rotation
     )
     scope = replace(
         scope,
         absorbed=placement.fit(sensitivities),
-        absorbed_before=placement.fit(before[..., None])[:, 0],
+        absorbed_before=placement.fit([before[..., None]])[:, 0],
     )
     return _add_left_out_effects(scope, placement, model, estimate, covariance, states)
 
@@ -264,9 +264,10 @@ class _Placement:
     columns: np.ndarray
     free: np.ndarray
 
-    def fit(self, fields: np.ndarray) -> np.ndarray:
-        """Fit the placement to fields (N, 6, K), as `fit_placement`."""
-        return fit_placement(self.columns, fields, self.free)
+    def fit(self, fields: Iterable[np.ndarray]) -> np.ndarray:
+        """Fit the placement to fields in blocks of poses, (n, 6, K) each, as
+        `fit_placement_to_blocks`."""
+        return fit_placement_to_blocks(self.columns, fields, self.free)
 
 
 def _is_rotation_fitted(model: Model) -> bool:
@@ -290,7 +291,7 @@ def _add_left_out_effects(
     if not left_out:
         return scope
     effects = LeftOutEffects.from_fit(model, estimate, covariance, states)
-    fields = effects.compute_fields(effects.states)
+    fields = effects.generate_fields(effects.states)
     effects = replace(effects, absorbed=placement.fit(fields))
     return replace(scope, left_out=left_out, left_out_effects=effects)
 
