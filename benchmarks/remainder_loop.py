@@ -36,7 +36,7 @@ from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.settings import Settings
 from elastocal.exchange.target_path import OK
-from elastocal.loop.whole import build_calibrated_robot
+from elastocal.loop.whole import build_calibrated_robot, remove_regression
 from elastocal.mechanics.robot import Robot
 
 GOAL = 1.3
@@ -139,16 +139,11 @@ def close_loop(poses: int, size: float, seed: int) -> dict[str, float]:
     case, held_out = measured_cases("loop", table, poses)
     diagnosis = diagnose(case, Settings(), seed)
     judgement = judge(diagnosis, held_out, seed)
-    corrected = {
-        name: build_calibrated_robot(
-            diagnosis,
-            judgement.held_out,
-            judgement.delivered,
-            physics_only=name == "physics",
-        )
-        for name in ("physics", "delivered")
-    }
-    return measure_corrections(deviating, corrected)
+    delivered = build_calibrated_robot(
+        diagnosis, judgement.held_out, judgement.delivered
+    )
+    physics = remove_regression(delivered, diagnosis, judgement.held_out)
+    return measure_corrections(deviating, {"physics": physics, "delivered": delivered})
 
 
 def measure_corrections(

@@ -40,6 +40,8 @@ from elastocal.verdict import write_verdict
 if TYPE_CHECKING:
     from pathlib import Path
 
+    import numpy as np
+
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.diagnosis.diagnose import Diagnosis
     from elastocal.diagnosis.judge import Judgement
@@ -114,11 +116,7 @@ def diagnose_folder(
 
 
 def build_calibrated_robot(
-    diagnosis: Diagnosis,
-    held_out: Case,
-    delivered: CorrectedResiduals | None,
-    *,
-    physics_only: bool = False,
+    diagnosis: Diagnosis, held_out: Case, delivered: CorrectedResiduals | None
 ) -> CalibratedRobot:
     """Return the robot of a diagnosis, with errors as large as validation poses show.
 
@@ -130,20 +128,14 @@ def build_calibrated_robot(
         Validation poses without gross errors.
     delivered : CorrectedResiduals or None
         Result of `judge.apply_regression`.
-    physics_only : bool
-        Whether to leave out the regression. The residual of the final model is then
-        still known not to be noise.
     """
     case = diagnosis.case
     final = diagnosis.final
-    transferred = transfer_fit(final, case, held_out)
-    residual = compute_position_residuals(*transferred, held_out.observations)
-    noise = get_noise(diagnosis.verdict.noise)
-    # What the model leaves beyond the noise counts as an error of the robot.
-    noise_m = compute_target_std_m(*transferred, held_out.observations, noise)
+    residual, noise_m = _compute_held_out_residual(diagnosis, held_out)
     regression = None
-    if delivered is not None and delivered.predictor is not None and not physics_only:
+    if delivered is not None and delivered.predictor is not None:
         residual = delivered.residual
+        noise = get_noise(diagnosis.verdict.noise)
         regression = build_residual_model(
             case,
             final.estimate,
@@ -156,6 +148,37 @@ def build_calibrated_robot(
     )
     robot = set_form_error(robot, diagnosis.verdict.other_models_m or 0.0)
     return inflate_to_held_out_errors(robot, held_out, residual, noise_m)
+
+
+def remove_regression(
+    robot: CalibratedRobot, diagnosis: Diagnosis, held_out: Case
+) -> CalibratedRobot:
+    """Return the robot of `build_calibrated_robot` without its regression on the
+    residuals, with errors as large as validation poses show for it.
+
+    The residual of the final model is then known not to be noise. Its best placement
+    stays the same: a regression moves the poses by too little to change it.
+    """
+    physics = replace(robot, residual_model=None)
+    physics = set_form_error(physics, diagnosis.verdict.other_models_m or 0.0)
+    return inflate_to_held_out_errors(
+        physics, held_out, *_compute_held_out_residual(diagnosis, held_out)
+    )
+
+
+def _compute_held_out_residual(
+    diagnosis: Diagnosis, held_out: Case
+) -> tuple[np.ndarray, float]:
+    """Residual (M, 3) of the final model at validation poses, and the tracker's standard
+    deviation of a coordinate, both in m.
+
+    What the model leaves beyond this noise counts as an error of the robot.
+    """
+    transferred = transfer_fit(diagnosis.final, diagnosis.case, held_out)
+    observations = held_out.observations
+    residual = compute_position_residuals(*transferred, observations)
+    noise = get_noise(diagnosis.verdict.noise)
+    return residual, compute_target_std_m(*transferred, observations, noise)
 
 
 def judge_and_predict(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgement:
@@ -175,10 +198,9 @@ def judge_and_predict(diagnosis: Diagnosis, held_out: Case, seed: int) -> Judgem
     robot = build_calibrated_robot(diagnosis, judgement.held_out, judgement.delivered)
     physics = None
     if robot.residual_model is not None:
-        physics_robot = build_calibrated_robot(
-            diagnosis, judgement.held_out, judgement.delivered, physics_only=True
+        physics = predict_campaign_accuracy(
+            remove_regression(robot, diagnosis, judgement.held_out)
         )
-        physics = predict_campaign_accuracy(physics_robot)
     contributions = compute_effect_contributions(
         replace(robot, residual_model=None), *select_campaign_commands(robot)
     )
