@@ -49,12 +49,14 @@ from elastocal.fitting.noise import (
 )
 from elastocal.fitting.observations import average_repeats
 from elastocal.mechanics.sites import build_sites
+from elastocal_proof.plant.contacts import draw_form, touch_surface
 
 TARGETS = tuple(
     Target(name, point, (0.1, 0.05, 0.0))
     for name, point in (("A", "6DoF"), ("B", "3DoF"), ("C", "2DoF"))
 )
 SENSOR_M = 50e-6
+FLAT = draw_form(np.random.default_rng(0), 0.0, 1.0)
 SENSOR_RAD = 30e-6
 
 
@@ -427,6 +429,27 @@ def test_contacts_with_wavy_planes_do_not_make_the_robot_smaller(tmp_path):
     ]
     assert np.abs(lengths).max() < 4.0
     assert not find_misplaced_frames(fit, case.campaign)
+
+
+def test_normals_that_are_known_take_no_degrees_of_freedom_from_the_noise(tmp_path):
+    """A normal is known far better than three touches of a small patch show it."""
+    workshop = open_workshop(5)
+    rows, features = [], {}
+    for patch in range(60):
+        normal = np.eye(3)[patch % 3]
+        place = workshop.find_tool(workshop.joint_limits.mean(axis=1))[0]
+        place += 1e-3 * patch
+        name = f"patch{patch}"
+        features[name] = {"normal": normal.tolist(), "normal_std_rad": 1e-6}
+        for _ in range(3):
+            angles = touch_surface(workshop, place, normal, FLAT, SENSOR_M)
+            rows.append({"angles": angles, "feature": name})
+    document = {"measured": "plane", "features": features}
+    case = build_contact_case(write_contacts(tmp_path / "cell", document, rows))
+    noise, _ = estimate_noise(case)
+    # 144 touches are fitted, less 60 heights, 3 coordinates of the tool and 4 offsets of
+    # joints: the estimate is 1 +- 0.08 times the noise.
+    assert noise.position_m == pytest.approx(SENSOR_M, rel=0.3)
 
 
 @pytest.mark.parametrize("share", [1.0, 0.1, 0.01])

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal_proof.plant.contacts import (
     Workshop,
+    draw_form,
     find_view,
     read_gauge,
     read_length,
@@ -15,6 +16,7 @@ from elastocal_proof.plant.contacts import (
     see_board,
     touch_plane,
     touch_sphere,
+    touch_surface,
 )
 
 
@@ -42,6 +44,31 @@ def test_a_contact_without_play_is_exact(workshop):
     assert abs(normal @ tip - 0.5) < 1e-10
     tip = workshop.find_tool(touch_sphere(workshop, place, 0.1, 0.0))[0]
     assert abs(np.linalg.norm(tip - place) - 0.1) < 1e-10
+
+
+def test_a_wavy_surface_is_touched_at_its_own_height(workshop):
+    place = np.array([1.0, 0.5, 0.7])
+    normal = np.array([0.0, 0.6, 0.8])
+    form = draw_form(workshop.draws, 1e-3, 0.1)
+    tip = workshop.find_tool(touch_surface(workshop, place, normal, form, 0.0))[0]
+    height = form.find_height(tip)
+    assert height != 0.0
+    np.testing.assert_allclose(tip - place, height * normal, atol=1e-10)
+
+
+def test_the_form_of_a_table_has_its_standard_deviation_and_its_length():
+    draws = np.random.default_rng(3)
+    steps = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    heights = []
+    for _ in range(400):
+        form = draw_form(draws, 2e-4, 0.1)
+        heights.append([form.find_height(step) for step in steps])
+    covariance = np.cov(np.array(heights).T) / 4e-8
+    # 400 forms: a correlation is within 0.15, and a variance within 20 %, with a
+    # probability of 0.997.
+    assert covariance[0, 0] == pytest.approx(1.0, rel=0.2)
+    assert covariance[0, 1] == pytest.approx(np.exp(-0.5), abs=0.15)
+    assert covariance[0, 2] == pytest.approx(0.0, abs=0.15)
 
 
 def test_play_and_noise_have_their_standard_deviations(workshop):

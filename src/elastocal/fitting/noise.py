@@ -765,12 +765,11 @@ def maximize_evidence(
     remaining = np.clip(remaining, _SHARE_ROUNDING, 1.0)
     values = get_parameter_values(wide.model, wide.estimate)[sized]
     rows = wide.weights.sum() * wide.residual.shape[1]
-    fitted_count = (~wide.unidentifiable).sum()
     log_evidence = _compute_log_evidence(
         axes.T @ (values / prior_std),
         remaining,
         (wide.whiten(wide.residual) ** 2).sum(),
-        max(rows - fitted_count + len(sized), 1.0),
+        max(rows - count_effective_parameters(wide, ~is_sized), 1.0),
     )
     factor, scale = np.unravel_index(np.argmax(log_evidence), log_evidence.shape)
     prior_scale = widest_scale * PRIOR_SCALES[scale] / PRIOR_SCALES[-1]
@@ -820,11 +819,14 @@ def _compute_log_evidence(
     )
 
 
-def count_effective_parameters(fitted: Fit) -> float:
+def count_effective_parameters(fitted: Fit, counted: np.ndarray | None = None) -> float:
     """Count free parameters; one with a prior counts by the share that it leaves open.
 
-    This is the trace of a ridge's hat matrix (Hastie et al., 3.4.1).
+    This is the trace of a ridge's hat matrix (Hastie et al., 3.4.1). Parameters that are
+    not `counted`, (P,) bool array, are left out.
     """
     free = ~fitted.unidentifiable
+    if counted is not None:
+        free = free & counted
     shrinkage = np.diag(fitted.covariance)[free] / fitted.prior_std[free] ** 2
     return float(free.sum() - shrinkage.sum())

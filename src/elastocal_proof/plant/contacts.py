@@ -107,6 +107,59 @@ def touch_plane(
     return workshop.touch(lambda position: position @ normal - height_m - error)
 
 
+@dataclass(frozen=True)
+class WavyForm:
+    """Heights of a surface over a plane: a sum of waves in random directions.
+
+    Attributes
+    ----------
+    amplitudes : (w,) array, m.
+    wave_vectors : (w, 3) array, rad/m.
+    phases : (w,) array, rad.
+    """
+
+    amplitudes: np.ndarray
+    wave_vectors: np.ndarray
+    phases: np.ndarray
+
+    def find_height(self, position: np.ndarray) -> float:
+        """Height, m, at a position (3,), m."""
+        waves = np.cos(self.wave_vectors @ position + self.phases)
+        return float(self.amplitudes @ waves)
+
+
+def draw_form(
+    draws: np.random.Generator, std_m: float, length_m: float, count: int = 60
+) -> WavyForm:
+    """Draw the form of a table, whose heights have a standard deviation and a correlation
+    that falls to 1/e at a distance of 1.4 lengths, as a squared exponential does."""
+    return WavyForm(
+        std_m * np.sqrt(2.0 / count) * np.ones(count),
+        draws.standard_normal((count, 3)) / length_m,
+        2.0 * np.pi * draws.random(count),
+    )
+
+
+def touch_surface(
+    workshop: Workshop,
+    place: np.ndarray,
+    normal: np.ndarray,
+    form: WavyForm,
+    noise_m: float,
+) -> np.ndarray:
+    """Joint angles (n,) with the tool on a wavy surface over a place (3,), m, of a plane
+    with a unit normal (3,). The contact repeats to `noise_m`."""
+    along = np.linalg.svd(normal[None])[2][1:]
+    error = noise_m * workshop.draws.standard_normal()
+
+    def find_heights(position: np.ndarray) -> np.ndarray:
+        from_place = position - place
+        height = normal @ from_place - form.find_height(position) - error
+        return np.array([*(along @ from_place), height])
+
+    return workshop.touch(find_heights)
+
+
 def touch_sphere(
     workshop: Workshop, centre: np.ndarray, radius_m: float, form_m: float
 ) -> np.ndarray:
