@@ -76,23 +76,25 @@ class Variant:
     ----------
     label : name in the output.
     importer : importer of the contacts in ``config/public_data.yaml``.
-    by_place : whether each place of a plane is a plane of its own with a known normal,
-        so that tables need not be flat.
+    form : "planes" if tables and wall are flat; "places" if each place of a surface is a
+        plane of its own with a known normal; "surfaces" if their forms are fitted.
     """
 
     label: str
     importer: str
-    by_place: bool
+    form: str
 
     def __str__(self) -> str:
         return self.label
 
 
-VARIANTS = (
-    Variant("planes", "motoman_planes", by_place=False),
-    Variant("places", "motoman_planes", by_place=True),
-    Variant("planes and other arm", "motoman_contacts", by_place=False),
-    Variant("places and other arm", "motoman_contacts", by_place=True),
+VARIANTS = tuple(
+    Variant(f"{form}{touched}", importer, form)
+    for touched, importer in (
+        ("", "motoman_planes"),
+        (" and other arm", "motoman_contacts"),
+    )
+    for form in ("planes", "places", "surfaces")
 )
 
 
@@ -115,9 +117,9 @@ def main(folder: Path) -> None:
                 f"{variant}, geometry": fit(contacts),
                 f"{variant}, diagnosis": diagnose(contacts, Settings(), SEED).final,
             }
-            touches_of_planes = select_planes(contacts)
+            touches_of_tables = select_tables(contacts)
             for model, fitted in models.items():
-                error_m = predict_tip_error(fitted, touches_of_planes)
+                error_m = predict_tip_error(fitted, touches_of_tables)
                 if error_m is not None:
                     print(f"{model}; predicted by the fit itself; {1e3 * error_m:.3f}")
                 for name, case in cases.items():
@@ -220,13 +222,24 @@ def write_contacts(
     folder = scratch / str(variant).replace(" ", "_")
     paths = [data / f"{name}.mat" for name in importer.files]
     importer.write_campaign(paths, folder, ROBOTS, folder.name)
-    if variant.by_place:
+    if variant.form == "planes":
+        flatten(folder)
+    elif variant.form == "places":
         split_by_place(folder)
     return read_whole_case(folder)
 
 
+def flatten(folder: Path) -> None:
+    """Make each surface a plane."""
+    document = read_document(folder / "campaign.yaml")
+    for keys in document["features"].values():
+        if keys["kind"] == "surface":
+            keys["kind"] = "plane"
+    rewrite(folder, document, pd.read_parquet(folder / "measurements.parquet"))
+
+
 def split_by_place(folder: Path) -> None:
-    """Make each place of a plane a plane of its own with a known normal.
+    """Make each place of a surface a plane of its own with a known normal.
 
     Places and normals are those of the nominal robot.
     """
@@ -237,7 +250,7 @@ def split_by_place(folder: Path) -> None:
     features = {}
     for feature, keys in whole_features.items():
         rows = np.flatnonzero(table["feature"] == feature)
-        if keys["kind"] != "plane":
+        if keys["kind"] != "surface":
             features[feature] = keys
             continue
         normal = find_normal(centre_m[rows])
@@ -254,10 +267,16 @@ def split_by_place(folder: Path) -> None:
                     "normal_std_rad": NORMAL_STD_RAD,
                 }
             table.loc[members, "feature"] = name
-    table = table[table["feature"] != ""]
+    document["features"] = features
+    rewrite(folder, document, table[table["feature"] != ""])
+
+
+def rewrite(folder: Path, document: dict[str, Any], table: pd.DataFrame) -> None:
+    """Write a campaign again with other features."""
+    kinds = dict.fromkeys(keys["kind"] for keys in document["features"].values())
     columns = {name: column.to_numpy() for name, column in table.items()}
     joints = sum(name.startswith("q") for name in columns)
-    write_campaign(folder, document | {"features": features}, columns, joints)
+    write_campaign(folder, document | {"measured": [*kinds]}, columns, joints)
 
 
 def locate_centres(document: dict[str, Any], table: pd.DataFrame) -> np.ndarray:
@@ -279,14 +298,14 @@ def find_normal(points_m: np.ndarray) -> np.ndarray:
     return normal
 
 
-def select_planes(case: Case) -> Observations:
-    """Select the contacts with planes, at which one arm stands still."""
-    planes = [
+def select_tables(case: Case) -> Observations:
+    """Select the contacts with tables and wall, at which one arm stands still."""
+    tables = [
         index
         for index, channel in enumerate(case.campaign.measuring.channels)
-        if channel.kind.name == "plane"
+        if channel.kind.name != "sphere"
     ]
-    return case.select(np.isin(case.campaign.measurements.channel, planes)).observations
+    return case.select(np.isin(case.campaign.measurements.channel, tables)).observations
 
 
 def write_folder(
