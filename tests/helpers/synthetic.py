@@ -25,7 +25,7 @@ from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import Observations, States
 from elastocal.mechanics.kinematics import compute_poses
 from elastocal.mechanics.robot import Compensator, Robot
-from elastocal.mechanics.sites import build_sites
+from elastocal.mechanics.sites import PushedSession, build_sites
 
 NOISE = Noise("declared", 60e-6, 60e-6, np.zeros(6))
 
@@ -53,7 +53,8 @@ def make_states(joints, count, seed=0, force=500.0, span=1.2, sessions=1, repeat
 
 def equipped(holder):
     """Return the sites of a robot or a chain, with a compensator at its shoulder and a
-    known gear ratio, so that every effect has candidates there."""
+    known gear ratio, so that every effect has candidates there, and with a stand that is
+    pushed."""
     robot = holder
     if not isinstance(holder, Robot):
         robot = robot_on(holder, np.zeros(holder.coordinates))
@@ -62,7 +63,7 @@ def equipped(holder):
         sites = replace(sites, compensator=Compensator(sites.shoulder + 1, "spring"))
     if not sites.gear_ratio:
         sites = replace(sites, gear_ratio=(101.0, *[None] * (sites.joints - 1)))
-    return sites
+    return replace(sites, pushed_sessions=(PushedSession(0, 0.0, 1.0),))
 
 
 def make_model(

@@ -103,6 +103,7 @@ class Conditions:
     temperature_c : temperature, (S,), °C; NaN if it is unknown. Only laws that need
         approach, time or temperature read them.
     progress : progress of the campaign, (S,), see `compute_progress`.
+    session : number of the session, (S,) of int.
     laws : displacements by laws that depend on joint angles alone, see `Candidate.fixed`,
         by the keys of their candidates.
     loads : loads that have been computed, by name.
@@ -118,6 +119,7 @@ class Conditions:
     time_s: np.ndarray
     temperature_c: np.ndarray
     progress: np.ndarray
+    session: np.ndarray
     laws: Cache[list[dict[int, np.ndarray]]] = field(
         default_factory=Cache, repr=False, compare=False
     )
@@ -335,6 +337,7 @@ def build_conditions(
         time_s,
         unknown[:, 0] if states.temperature_c is None else states.temperature_c,
         compute_progress(states, timeline.row_span),
+        states.session,
     )
 
 
@@ -355,6 +358,7 @@ def select_conditions(conditions: Conditions, chosen: slice | np.ndarray) -> Con
         time_s=conditions.time_s[chosen],
         temperature_c=conditions.temperature_c[chosen],
         progress=conditions.progress[chosen],
+        session=conditions.session[chosen],
         laws=Cache(),
     )
 

@@ -20,7 +20,7 @@ from elastocal.fitting.model import sum_displacements
 from elastocal.fitting.observations import States
 from elastocal.mechanics.kinematics import compute_poses
 from elastocal.mechanics.robot import Robot
-from elastocal.mechanics.sites import Sites, build_sites
+from elastocal.mechanics.sites import PushedSession, Sites, build_sites
 
 # The joint that carries the arm shows most effects; an effect that can act at several
 # joints is shown at this one.
@@ -193,7 +193,11 @@ def list_candidates(name: str, robot: Robot) -> list[Candidate]:
 
 def _find_sites(name: str, robot: Robot) -> Sites:
     """Sites of the arm without masses, unless the effect exists only with them."""
-    with_masses = replace(build_sites(robot), gear_ratio=(_GEAR_RATIO,) * robot.joints)
+    with_masses = replace(
+        build_sites(robot),
+        gear_ratio=(_GEAR_RATIO,) * robot.joints,
+        pushed_sessions=(PushedSession(0, 0.0, 1.0),),
+    )
     without_masses = replace(with_masses, masses=())
     if list_effects()[name].candidates(without_masses):
         return without_masses

@@ -46,7 +46,7 @@ def prepare_case(campaign: Campaign, source: str) -> Case:
     )
     candidates = {
         key: candidate
-        for key, candidate in candidates_on(sites).items()
+        for key, candidate in candidates_on(model.sites).items()
         if candidate.effect not in campaign.declared
     }
     case = Case(

@@ -45,7 +45,7 @@ from elastocal.mechanics.kinematics import (
     compute_point_poses,
     compute_pose_differences,
 )
-from elastocal.mechanics.sites import Sites, build_sites
+from elastocal.mechanics.sites import PushedSession, Sites, build_sites
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -244,7 +244,14 @@ def build_declared_model(
     # Without known weights, a compliant base under an arm that slides on its first
     # joint is indistinguishable from the sag of that arm.
     unknown_load = not sites.masses and not measurements.wrench.any()
-    sites = replace(sites, bears_typical_weight=sites.prismatic[0] and unknown_load)
+    row_span = None
+    if len(measurements):
+        row_span = (int(measurements.row.min()), int(measurements.row.max()))
+    sites = replace(
+        sites,
+        bears_typical_weight=sites.prismatic[0] and unknown_load,
+        pushed_sessions=find_pushed_sessions(campaign, row_span),
+    )
     own_effects = []
     if campaign.compliance == "identify":
         own_effects.append(joint_compliance(sites))
@@ -257,9 +264,6 @@ def build_declared_model(
         )
     if campaign.base_std_m:
         own_effects.append(declared_base(sites))
-    row_span = None
-    if len(measurements):
-        row_span = (int(measurements.row.min()), int(measurements.row.max()))
     time_s = measurements.time_s
     return Model(
         sites,
@@ -274,6 +278,26 @@ def build_declared_model(
         campaign.base_std_m,
         campaign.measuring if campaign.measuring.channels else None,
     )
+
+
+def find_pushed_sessions(
+    campaign: Campaign, row_span: tuple[int, int] | None
+) -> tuple[PushedSession, ...]:
+    """Find the sessions in which the target sits in a place, if all sessions are
+    so."""
+    if row_span is None or not all(
+        kind.holds_target for kind in campaign.measuring.kinds
+    ):
+        return ()
+    first, last = row_span
+    length = max(last - first, 1)
+    measurements = campaign.measurements
+    pushed = []
+    for session in np.unique(measurements.session).tolist():
+        rows = measurements.row[measurements.session == session]
+        start, end = (rows.min() - first) / length, (rows.max() - first) / length
+        pushed.append(PushedSession(session, float(start), float(end)))
+    return tuple(pushed)
 
 
 def build_nominal_model(model: Model) -> Model:

@@ -27,6 +27,7 @@ class Point(Kind):
     """Target in a place."""
 
     name = "point"
+    holds_target = True
     meaning = "the target is in a place: a ball in a socket, a tip in a cone"
     numbers = 3
     keys: ClassVar = {

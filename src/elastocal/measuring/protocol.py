@@ -127,6 +127,8 @@ class Kind:
     columns : columns that the user writes for a row.
     is_converted : whether measured poses must be converted to those of the target.
     touches : whether the columns may be left out, because contact means zero.
+    holds_target : whether the target sits in a place, so that a push on the robot also
+        pushes what stands there.
     keys : keys of a feature of this kind, each with its meaning; None if rows refer to
         no feature.
     sensor : the usual instrument, whose noise a plan assumes; None if there is none.
@@ -143,6 +145,7 @@ class Kind:
     columns: Sequence[str] = ()
     is_converted: bool = False
     touches: bool = False
+    holds_target: bool = False
     keys: ClassVar[Mapping[str, str] | None] = None
     sensor: ClassVar[Sensor | None] = None
     place_keys: ClassVar[Mapping[str, float | None]] = {}

@@ -44,6 +44,22 @@ _TORQUE_POSES = 16
 
 
 @dataclass(frozen=True)
+class PushedSession:
+    """A session in which the robot sits in a place, so that a push on the robot may move
+    what stands there.
+
+    Attributes
+    ----------
+    session : number of the session.
+    start, end : progress of the campaign at its first and at its last fitted row.
+    """
+
+    session: int
+    start: float
+    end: float
+
+
+@dataclass(frozen=True)
 class Sites:
     """A chain with every coordinate in which the robot can deviate.
 
@@ -75,6 +91,7 @@ class Sites:
     bears_typical_weight : bool
         Whether the structure, but no joint, bears the weight of `typical_masses_kg`.
         This is so for an arm that slides if neither masses nor loads are known.
+    pushed_sessions : sessions of the campaign in which the robot sits in a place
     """
 
     chain: Chain
@@ -95,6 +112,7 @@ class Sites:
     payload_kg: float | None = None
     compliance: tuple[float, ...] = ()
     bears_typical_weight: bool = False
+    pushed_sessions: tuple[PushedSession, ...] = ()
 
     @cached_property
     def tracked_points(self) -> tuple[MeasuringPoint, ...]:
