@@ -49,6 +49,8 @@ ARMS = {
     "panda_6": "panda",
     "panda_7": "panda",
     "kuka_14": "iiwa14",
+    "dinova_1": "gen3_lite",
+    "dinova_2": "gen3_lite",
 }
 REPLICATES = 1000
 
