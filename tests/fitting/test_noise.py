@@ -12,6 +12,7 @@ import pytest
 from contact_campaigns import (
     build_contact_case,
     open_workshop,
+    spread_places,
     touch_crossing_planes,
     write_contacts,
 )
@@ -49,7 +50,7 @@ from elastocal.fitting.noise import (
 )
 from elastocal.fitting.observations import average_repeats
 from elastocal.mechanics.sites import build_sites
-from elastocal_proof.plant.contacts import draw_form, touch_surface
+from elastocal_proof.plant.contacts import draw_form, seat_in_socket, touch_surface
 
 TARGETS = tuple(
     Target(name, point, (0.1, 0.05, 0.0))
@@ -418,7 +419,7 @@ def test_contacts_with_wavy_planes_do_not_make_the_robot_smaller(tmp_path):
         "noise": {"position_m": 5e-5},
     }
     case = build_contact_case(write_contacts(tmp_path / "cell", document, rows))
-    assert find_widest_scale(case.model, case.observations) == 1.0
+    assert find_widest_scale(case.model, case.observations) == PRIOR_SCALES[-1]
     noise, _ = estimate_noise(case)
     fit = fit_declared_model(case.model, case.observations, noise)
     values = get_parameter_values(fit.model, fit.estimate)
@@ -429,6 +430,20 @@ def test_contacts_with_wavy_planes_do_not_make_the_robot_smaller(tmp_path):
     ]
     assert np.abs(lengths).max() < 4.0
     assert not find_misplaced_frames(fit, case.campaign)
+
+
+def test_sockets_at_unknown_places_do_not_widen_the_prior_of_lengths(tmp_path):
+    workshop = open_workshop(3)
+    (place,) = spread_places(workshop, 1)
+    rows = [
+        {"angles": seat_in_socket(workshop, place, 1e-4), "feature": "socket"}
+        for _ in range(20)
+    ]
+    for keys, widest in (({}, 1.0), ({"position_m": place.tolist()}, PRIOR_SCALES[-1])):
+        document = {"measured": "point", "features": {"socket": keys}}
+        folder = write_contacts(tmp_path / f"{widest}", document, rows)
+        case = build_contact_case(folder)
+        assert find_widest_scale(case.model, case.observations) == widest
 
 
 def test_normals_that_are_known_take_no_degrees_of_freedom_from_the_noise(tmp_path):

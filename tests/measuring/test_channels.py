@@ -117,3 +117,21 @@ def test_contacts_with_unknown_features_contain_no_length(
 ):
     plan = parse_measuring({"frame": "base"} | document, "c")
     assert plan.shows_lengths(np.full((4, 1), value_m)) == shows_lengths
+
+
+@pytest.mark.parametrize(
+    ("measured", "value_m", "is_touch_alone"),
+    [
+        (["plane"], 0.0, True),
+        (["plane"], 0.02, False),
+        (["point"], 0.0, False),
+        (["line"], 0.0, False),
+        (["plane", "sphere"], 0.0, True),
+        (["plane", "point"], 0.0, False),
+    ],
+)
+def test_contacts_with_a_single_number_are_touches(measured, value_m, is_touch_alone):
+    features = {kind: {"kind": kind} for kind in measured}
+    document = {"measured": measured, "features": features, "frame": "base"}
+    plan = parse_measuring(document, "c")
+    assert plan.is_touch_alone(np.full((4, 1), value_m)) == is_touch_alone

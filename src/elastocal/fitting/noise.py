@@ -731,12 +731,14 @@ class PriorEvidence(NamedTuple):
 def find_widest_scale(model: Model, observations: Observations) -> float:
     """Find the widest prior of declared geometry, in plausible sizes.
 
-    Contacts with unknown places or planes contain no length. A smaller robot touches all
-    of them more exactly, so their evidence always prefers larger errors of geometry. The
-    prior is then no wider than the plausible sizes.
+    Contacts with unknown places contain no length. A smaller robot touches all of them
+    more exactly, so their evidence always prefers larger errors of geometry. The prior is
+    then no wider than the plausible sizes. The likelihood of contacts with a single
+    number prefers no size of the robot: see `contact_density`.
     """
     plan = model.measuring
-    if plan is None or plan.shows_lengths(observations.position):
+    numbers = observations.position
+    if plan is None or plan.shows_lengths(numbers) or plan.is_touch_alone(numbers):
         return float(PRIOR_SCALES[-1])
     return 1.0
 

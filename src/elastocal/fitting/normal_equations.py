@@ -14,11 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotri
 
+from elastocal.fitting.contact_density import compute_mean_strains
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import (
     compute_displaced_coordinates,
     compute_residuals,
     evaluate_conditions,
+    get_parameter_values,
     update_springs_and_masses,
 )
 from elastocal.fitting.observations import batch_groups_by_size, split_into_blocks
@@ -432,6 +434,7 @@ class LeastSquaresProblem:
                 block.conditions = evaluate_conditions(
                     model, estimate, block.observations.states
                 )
+        self.strains = compute_mean_strains(model, estimate, observations)
         # The factored form needs each whitened row to belong to one state, so a pose
         # error that correlates several states rules it out.
         poses = observations.cluster.max() + 1
@@ -486,6 +489,7 @@ class LeastSquaresProblem:
         gram = np.zeros((size, size))
         gradient = np.zeros(size)
         root = np.sqrt(weights)
+        squares = 0.0
         for block in self.blocks if size else ():
             linear_model = block.linear_model or self._linearize_block(block)
             whitening = block.whitening
@@ -495,10 +499,18 @@ class LeastSquaresProblem:
                 _map_to_rotation_vectors(residual) * block_root[:, None, None]
             )
             whitened = whitening.apply(residual * block_root[:, None])
+            squares += float((whitened**2).sum())
             adjoint = whitened_map.transposed.apply(whitened)
             gradient += linear_model.columns.times(adjoint[..., None])[:, 0]
             if reused_gram is None:
                 gram += self._compute_gram(linear_model, whitened_map)
+        if self.strains is not None:
+            stretch = self._compute_stretch(self.estimate)
+            gram, gradient = _add_strains(
+                gram, gradient, squares, self.strains / stretch
+            )
+            gram /= stretch**2
+            gradient /= stretch**2
         if reused_gram is None:
             reused_gram = gram * np.outer(self.plausible, self.plausible)
         return reused_gram, gradient * self.plausible
@@ -523,6 +535,8 @@ class LeastSquaresProblem:
     def squares(self, weights: np.ndarray, estimate: Estimate | None = None) -> float:
         """Compute the sum of squares of the weighted, whitened residual.
 
+        Heights of contacts are divided by the mean of |dh/dt|: see `contact_density`.
+
         Parameters
         ----------
         weights : (M,) array
@@ -545,7 +559,11 @@ class LeastSquaresProblem:
             vectors = residual.reshape(len(residual), -1, 3)
             turned = vectors @ turn[session].transpose(0, 2, 1)
             residual = turned.reshape(residual.shape)
-        return float((self._whiten(residual * np.sqrt(weights)[:, None]) ** 2).sum())
+        weighted = self._whiten(residual * np.sqrt(weights)[:, None])
+        squares = float((weighted**2).sum())
+        if self.strains is None:
+            return squares
+        return squares / self._compute_stretch(estimate) ** 2
 
     def finish(self, estimate: Estimate) -> FittedState:
         """Evaluate at the last estimate, under the loads to which the last step led."""
@@ -573,6 +591,12 @@ class LeastSquaresProblem:
             np.concatenate(jacobians) if jacobians else None,
             conditions,
         )
+
+    def _compute_stretch(self, estimate: Estimate) -> float:
+        """Compute the mean of |dh/dt| over contacts, relative to the nominal robot."""
+        assert self.strains is not None
+        values = get_parameter_values(self.model, estimate)
+        return 1.0 + float(self.strains @ values)
 
     def _compute_residual(self, estimate: Estimate) -> np.ndarray:
         return np.concatenate(
@@ -622,6 +646,19 @@ class LeastSquaresProblem:
             self.model, self.estimate, block.observations, self.noise
         )
         return compute_whitening(block.observations, jacobian, self.noise, roots)
+
+
+def _add_strains(
+    gram: np.ndarray, gradient: np.ndarray, squares: float, strains: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Change Gram matrix (P, P) and gradient (P,) to those of the residual over the mean
+    |dh/dt| of contacts, times this mean.
+
+    With sensitivities S, residual r and the strains s over the mean, S becomes S + r s'.
+    """
+    mixed = np.outer(gradient, strains)
+    gram = gram + mixed + mixed.T + squares * np.outer(strains, strains)
+    return gram, gradient + squares * strains
 
 
 def _map_to_rotation_vectors(residual: np.ndarray) -> np.ndarray:

@@ -100,6 +100,13 @@ class MeasuringPlan:
         are_contacts = all(kind.is_contact for kind in self.kinds)
         return has_stated_length or not are_contacts or bool(numbers.any())
 
+    def is_touch_alone(self, numbers: np.ndarray) -> bool:
+        """Whether all rows are contacts with a single number, such as those with planes
+        and spheres; `numbers` as in `shows_lengths`."""
+        return all(
+            kind.is_contact and kind.numbers == 1 for kind in self.kinds
+        ) and not bool(numbers.any())
+
     @property
     def columns(self) -> tuple[str, ...]:
         """Columns with the numbers of all kinds, in their order."""
