@@ -73,7 +73,7 @@ def with_version(
         bool, Option("--version", help="Print the version and exit.")
     ] = False,
 ) -> None:
-    """From a robot and a laser tracker to a corrected robot.
+    """From a robot and measurements of its errors to a corrected robot.
 
     The steps in order: plan, measure, check, diagnose, correct, certificate,
     verify.
