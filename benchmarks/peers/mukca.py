@@ -80,8 +80,8 @@ def fit_geometry(
     sockets, m, and these poses."""
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "arm"
-        document = describe_sockets("arm", robot, recordings)
         joints = recordings[0].angles.shape[1]
+        document = describe_sockets("arm", robot, recordings, f"{joints}DoF")
         write_campaign(folder, document, tabulate_recordings(recordings), joints)
         descriptions, training, held_out = load_campaign(
             read_campaign_folder(folder, ROBOTS)

@@ -42,7 +42,7 @@ def test_the_document_of_recordings_is_a_valid_campaign(sockets):
     recordings = [
         Recording("front", socket, np.zeros((2, 7))) for socket in range(sockets)
     ]
-    document = describe_sockets("mine", "panda", recordings, 0.06)
+    document = describe_sockets("mine", "panda", recordings, "7DoF", 0.06)
     check_document(document, "campaign", "campaign.yaml")
     assert len(document["features"]) == sockets
     if sockets == 2:
@@ -55,10 +55,11 @@ def test_the_document_of_recordings_is_a_valid_campaign(sockets):
     ("name", "text", "key", "phrases"),
     [
         ("socket.csv", "0,1\n", "name", ["'socket.csv'", "hole_0.csv"]),
-        ("hole_0.csv", "0,1\n0,1,2\n", "", ["columns", "joint angles in rad"]),
-        ("hole_0.csv", "a,b\n", "", ["could not convert", "joint angles in rad"]),
-        ("hole_0.csv", "0,1\n0,nan\n", "row 2", ["nan for joint 2", "an angle in rad"]),
-        ("hole_0.csv", "90,1\n", "row 1", ["90 for joint 1", "two turns"]),
+        ("hole_0.csv", "0,1\n\n0,1,2\n", "line 3", ["3 angles", "2, as in"]),
+        ("hole_0.csv", "q1,q2\n0,1\n", "line 1, joint 1", ["'q1'", "no header"]),
+        ("hole_0.csv", "0;1\n", "line 1, joint 1", ["'0;1'", "separated by commas"]),
+        ("hole_0.csv", "0,1\n0,nan\n", "line 2, joint 2", ["'nan'", "in rad"]),
+        ("hole_0.csv", "90,1\n", "line 1, joint 1", ["90", "rad, not degrees"]),
     ],
 )
 def test_a_faulty_file_is_refused_in_one_line(tmp_path, name, text, key, phrases):
@@ -67,7 +68,6 @@ def test_a_faulty_file_is_refused_in_one_line(tmp_path, name, text, key, phrases
         read_recording(path)
 
 
-@pytest.mark.filterwarnings("ignore:loadtxt")
 def test_an_empty_file_is_refused(tmp_path):
     path = write_file(tmp_path / "front", "")
     with refused(path, "", "no line of joint angles", "joint angles in rad"):

@@ -219,12 +219,12 @@ def test_joint_angles_come_from_a_file_of_their_own(elastocal, refusal, tmp_path
     assert "--joints FILE" in refusal("import", "csv", joints, "--folder", tmp_path)
 
 
-def write_sockets(folder, poses=6):
+def write_sockets(folder, poses=6, joints=7):
     """Write recordings of a ball in two sockets at two places."""
     rng = np.random.default_rng(1)
     for place, socket in itertools.product(("front", "left"), (0, 1)):
         (folder / place).mkdir(parents=True, exist_ok=True)
-        angles = rng.uniform(-1, 1, (poses, 7))
+        angles = rng.uniform(-1, 1, (poses, joints))
         np.savetxt(folder / place / f"hole_{socket}.csv", angles, delimiter=",")
     return folder
 
@@ -244,6 +244,31 @@ def test_recordings_in_sockets_become_a_campaign_that_can_be_read(
     assert "that are there already" in refusal(*command)
     assert elastocal(*command, "--force").exit_code == 0
     assert "less than 1 m" in refusal(*command, "--force", "--distance", "50")
+    short = write_sockets(tmp_path / "short", joints=6)
+    command = ("import", "sockets", short, "--folder", tmp_path / "b", "--robot", PANDA)
+    message = refusal(*command)
+    assert "front/hole_0.csv: found 6 angles in a line; allowed: 7" in message
+
+
+def test_the_measured_target_sits_at_the_last_point_of_a_robot_from_a_urdf(
+    elastocal, tmp_path
+):
+    # `import urdf` names this point as the URDF names the link.
+    robot = tmp_path / "robot.yaml"
+    robot.write_text(PANDA.read_text().replace("[7DoF]", "[tool0]"))
+    angles, rotation, position = make_board_poses()
+    seen = tmp_path / "calib.npz"
+    vectors = Rotation.from_matrix(rotation).as_rotvec()
+    np.savez(seen, rvecs=vectors, tvecs=position, q=angles)
+    imports = {"sockets": write_sockets(tmp_path / "recordings"), "board": seen}
+    for kind, source in imports.items():
+        folder = tmp_path / kind
+        result = elastocal("import", kind, source, "--folder", folder, "--robot", robot)
+        assert result.exit_code == 0, result.exception
+        read_campaign(read_campaign_folder(folder, PANDA.parent))
+        document = yaml.safe_load((folder / "campaign.yaml").read_text())
+        (target,) = document["targets"].values()
+        assert target["point"] == "tool0"
 
 
 def test_sockets_are_by_default_as_far_apart_as_mukca_prints_them():

@@ -43,7 +43,7 @@ def test_a_row_has_the_pose_of_the_board_and_the_target_is_on_the_robot(camera, 
 
 @pytest.mark.parametrize("camera", [ON_ROBOT, BESIDE_ROBOT])
 def test_the_document_is_a_valid_campaign_of_the_tables_target(camera):
-    document = describe_board_campaign("mine", 7, camera)
+    document = describe_board_campaign("mine", "7DoF", camera)
     check_document(document, "campaign", "campaign.yaml")
     assert {*document["targets"]} == {*tabulate_board_poses(POSES, camera)["target"]}
 

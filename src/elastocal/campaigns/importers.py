@@ -420,7 +420,9 @@ class SocketImporter(Importer):
         recordings = [read_recording(path) for path in paths]
         table = tabulate_recordings(recordings)
         joints = recordings[0].angles.shape[1]
-        document = describe_sockets(name, self.robots[0], recordings, self.distance_m)
+        document = describe_sockets(
+            name, self.robots[0], recordings, f"{joints}DoF", self.distance_m
+        )
         if self.noise is not None:
             document["noise"] = dict(self.noise)
         return _ImportedCampaign(document, table, joints)

@@ -23,7 +23,9 @@ import numpy as np
 
 from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, GEOMETRY
 from elastocal.campaigns.measurements import tabulate_single_measurements
+from elastocal.campaigns.tables import LARGEST_BYTES
 from elastocal.errors import InputError
+from elastocal.io.texts import parse_number, read_text
 
 # Distance of neighbouring sockets of the tool that MUKCa prints.
 SOCKET_DISTANCE_M = 0.05
@@ -36,7 +38,9 @@ SOCKET_STD_M = 1.0e-4
 # Name of a file of joint angles, with the number of its socket.
 _SOCKET_FILE = re.compile(r"hole_(\d)\.csv")
 _SOCKET_PATTERN = "hole_*.csv"
-_ALLOWED_FILE = "joint angles in rad separated by commas, one line for each pose"
+_ALLOWED_FILE = (
+    "joint angles in rad separated by commas, one line for each pose, no header"
+)
 # No joint turns further than this; a larger number is an angle in degrees.
 _LARGEST_ANGLE_RAD = 4 * np.pi
 
@@ -67,19 +71,34 @@ def read_recording(path: str | Path) -> Recording:
     if match is None:
         allowed = "hole_0.csv, hole_1.csv and so on, numbered by socket"
         raise InputError(path, "name", repr(path.name), allowed)
-    try:
-        angles = np.loadtxt(path, delimiter=",", ndmin=2)
-    except (ValueError, OSError) as error:
-        raise InputError(path, "", str(error), _ALLOWED_FILE) from None
-    if angles.size == 0:
+    rows: list[list[float]] = []
+    for number, line in enumerate(read_text(path, LARGEST_BYTES).splitlines(), 1):
+        cells = line.partition("#")[0]
+        if cells.strip():
+            angles = _read_angles(path, number, cells.split(","))
+            if rows and len(angles) != len(rows[0]):
+                allowed = f"{len(rows[0])}, as in the lines above"
+                count = f"{len(angles)} angles"
+                raise InputError(path, f"line {number}", count, allowed)
+            rows.append(angles)
+    if not rows:
         raise InputError(path, "", "no line of joint angles", _ALLOWED_FILE)
-    wrong = ~np.isfinite(angles) | (np.abs(angles) > _LARGEST_ANGLE_RAD)
-    if wrong.any():
-        row, joint = np.argwhere(wrong)[0]
-        angle = f"{angles[row, joint]:g} for joint {joint + 1}"
-        allowed = "an angle in rad of at most two turns"
-        raise InputError(path, f"row {row + 1}", angle, allowed)
-    return Recording(path.parent.name, int(match[1]), angles)
+    return Recording(path.parent.name, int(match[1]), np.array(rows))
+
+
+def _read_angles(path: Path, number: int, cells: Sequence[str]) -> list[float]:
+    """Read the angles of one line, rad; `number` counts lines from 1."""
+    angles = []
+    for joint, cell in enumerate(cells, 1):
+        text = cell.strip()
+        angle = parse_number(text)
+        key = f"line {number}, joint {joint}"
+        if angle is None:
+            raise InputError(path, key, repr(text), _ALLOWED_FILE)
+        if abs(angle) > _LARGEST_ANGLE_RAD:
+            raise InputError(path, key, text, "rad, not degrees: at most two turns")
+        angles.append(angle)
+    return angles
 
 
 def find_recordings(folder: str | Path) -> list[Path]:
@@ -99,6 +118,7 @@ def describe_sockets(
     name: str,
     robot: str,
     recordings: Sequence[Recording],
+    point: str,
     distance_m: float = SOCKET_DISTANCE_M,
 ) -> dict[str, Any]:
     """Return ``campaign.yaml`` of recordings.
@@ -107,17 +127,17 @@ def describe_sockets(
     ----------
     name : name of the campaign.
     robot : as in ``campaign.yaml``.
-    recordings : all sockets of all places; the ball sits behind the last joint.
+    recordings : all sockets of all places.
+    point : measuring point of the robot behind which the ball sits.
     distance_m : distance between the centres of neighbouring sockets.
     """
-    joints = recordings[0].angles.shape[1]
     sockets = sorted({recording.socket for recording in recordings})
     document: dict[str, Any] = {
         "campaign": name,
         "robot": robot,
         "measured": "point",
         "frame": "unknown",
-        "targets": {TARGET: {"point": f"{joints}DoF", "offset_m": "unknown"}},
+        "targets": {TARGET: {"point": point, "offset_m": "unknown"}},
         "features": {name_socket(socket): {} for socket in sockets},
         "compliance": "nominal",
         "declared": [*GEOMETRY],

@@ -353,7 +353,17 @@ def sockets(
     paths = find_recordings(recordings)
     files = [read_recording(path) for path in paths]
     table = tabulate_recordings(files)
-    document = describe_sockets(folder.resolve().name, ROBOT_FILE, files, distance)
+    if files[0].angles.shape[1] != arm.commands:
+        count = f"{files[0].angles.shape[1]} angles in a line"
+        allowed = f"{arm.commands}, the joints of {arm.name}"
+        raise InputError(paths[0], "", count, allowed)
+    document = describe_sockets(
+        folder.resolve().name,
+        ROBOT_FILE,
+        files,
+        arm.chain.end_effector.name,
+        distance,
+    )
     stands = len({recording.stand for recording in files})
     size = (
         f"{format_count(len(table['pose']), 'pose')} in {format_count(len(paths), 'socket')}"
@@ -416,7 +426,7 @@ def board(
     place = camera.replace("-", "_")
     table = tabulate_board_poses(poses, place)
     document = describe_board_campaign(
-        folder.resolve().name, arm.joints, place, poses.noise
+        folder.resolve().name, arm.chain.end_effector.name, place, poses.noise
     )
     size = f"{format_count(len(table['pose']), 'pose')} of a board, camera {camera}"
     _write_campaign_folder(folder, document, table, arm.joints, robot, [size])

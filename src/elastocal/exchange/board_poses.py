@@ -105,18 +105,18 @@ def tabulate_board_poses(poses: BoardPoses, camera: str) -> dict[str, np.ndarray
 
 
 def describe_board_campaign(
-    name: str, joints: int, camera: str, noise: Mapping[str, float] | None = None
+    name: str, point: str, camera: str, noise: Mapping[str, float] | None = None
 ) -> dict[str, Any]:
     """Return ``campaign.yaml`` of poses of a board, with robot.yaml beside it.
 
     Parameters
     ----------
     name : name of the campaign.
-    joints : number of joints; camera or board sits behind the last one.
+    point : measuring point of the robot behind which the camera or the board sits.
     camera : where the camera is, as in ``campaign.yaml``.
     noise : as in ``campaign.yaml``; None: `NOISE`.
     """
-    mount = {"point": f"{joints}DoF", "offset_m": "unknown", "rotation": "unknown"}
+    mount = {"point": point, "offset_m": "unknown", "rotation": "unknown"}
     return {
         "campaign": name,
         "robot": ROBOT_FILE,
