@@ -37,12 +37,13 @@ def rows():
     return touched, places
 
 
-def fit(folder, rows, features, frame="base"):
+def fit(folder, rows, features, frame="base", **keys):
     document = {
         "measured": "point",
         "frame": frame,
         "features": features,
         "noise": {"position_m": 5e-5},
+        **keys,
     }
     case = build_contact_case(write_contacts(folder, document, rows))
     noise, _ = estimate_noise(case)
@@ -56,7 +57,7 @@ def test_unknown_sockets_hide_the_base_and_all_lengths(tmp_path, rows):
     }
     assert unseen["where the base stands along x"] == KNOWN
     assert unseen["the zero of joint 1"] == KNOWN
-    assert unseen[SCALE] == "two sockets whose distance is known"
+    assert unseen[SCALE] == "two sockets whose distance is known to 0.03 %"
     assert "the zero of joint 3" not in unseen
     sentences = describe_unseen_errors(find_unseen_errors(fitted, observations))
     assert any(
@@ -77,6 +78,26 @@ def test_sockets_that_are_known_in_the_base_show_where_it_stands(tmp_path, rows)
     unseen = {error.name for error in find_unseen_errors(fitted, observations)}
     assert SCALE not in unseen
     assert "where the base stands along z" not in unseen
+
+
+def test_the_stated_accuracy_of_a_distance_suffices_for_the_scale(tmp_path, rows):
+    touched, places = rows
+    distance_m = float(np.linalg.norm(places[1] - places[0]))
+    for share, is_unseen in ((0.9 * 1e-3 / 3, False), (2.0 * 1e-3 / 3, True)):
+        known = {
+            "between": ["socket0", "socket1"],
+            "distance_m": distance_m,
+            "std_m": share * distance_m,
+        }
+        fitted, observations = fit(
+            tmp_path / f"{share}",
+            touched,
+            {"socket0": {}, "socket1": {}},
+            "unknown",
+            distances=[known],
+        )
+        unseen = {error.name for error in find_unseen_errors(fitted, observations)}
+        assert (SCALE in unseen) == is_unseen
 
 
 def test_the_predicted_error_of_the_tip_falls_with_the_noise(tmp_path, rows):

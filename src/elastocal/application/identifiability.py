@@ -45,7 +45,9 @@ _RANK_ROUNDING = 1e-9
 _MOST_NAMED = 6
 # Distance of two sockets, m, that a gauge or a printed tool has.
 _PAIR_M = 0.05
-_PAIR = "two sockets whose distance is known"
+# A campaign may have such a distance already. Then it is not known well enough: the error
+# of its scale has the tested size only if it is `_SEEN` standard deviations.
+_PAIR = f"two sockets whose distance is known to {100 * _SIZE / _SEEN:.2f} %"
 _KNOWN = "places that are known in the base frame"
 _SCALE = "a common scale of all lengths"
 _AXES = ("along x", "along y", "along z", "about x", "about y", "about z")
