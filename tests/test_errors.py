@@ -114,7 +114,7 @@ def test_a_fault_of_the_machine_is_one_line_with_a_remedy(error, phrase):
 def test_a_missing_package_of_an_extra_is_explained():
     missing = ModuleNotFoundError("no typst", name="typst.sub")
     with (
-        pytest.raises(InputError, match=r"no package typst.*elastocal\[report\]"),
+        pytest.raises(InputError, match=r"no package typst.*-e '\.\[report\]'"),
         explain_missing_packages(),
     ):
         raise missing

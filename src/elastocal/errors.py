@@ -162,7 +162,11 @@ def describe_missing_package(error: ImportError) -> InputError | None:
     package = (error.name or "").partition(".")[0]
     if package not in EXTRAS:
         return None
-    allowed = f"an environment with it: pip install 'elastocal[{EXTRAS[package]}]'"
+    # No package index has this project, so the extra comes from a clone.
+    allowed = (
+        "an environment with it: in the clone of elastocal,"
+        f" python -m pip install -e '.[{EXTRAS[package]}]'"
+    )
     return InputError("Python", "", f"no package {package}", allowed)
 
 

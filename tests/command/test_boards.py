@@ -15,6 +15,7 @@ def test_a_board_is_printed_with_its_description(elastocal, refusal, tmp_path):
     result = elastocal("board", "--pdf", pdf, "--columns", 6, "--rows", 8)
     assert result.exit_code == 0, result.exception
     assert "must be 100 mm long" in result.output
+    assert f"--board {tmp_path / 'board.yaml'}" in result.output.replace("\n", "")
     assert pdf.read_bytes().startswith(b"%PDF")
     # A4 in points of 1/72 inch.
     assert b"/MediaBox [ 0 0 595.275" in pdf.read_bytes()
@@ -46,6 +47,8 @@ def test_images_become_a_table_of_poses(elastocal, tmp_path, known):
     assert result.exit_code == 0, result.exception
     assert "9 poses of the board in 10 images" in result.output
     assert "left out: 9.png: 0 corners" in result.output
+    next_step = result.output.partition("next: ")[2]
+    assert "elastocal import board" in next_step and "--robot robot.yaml" in next_step
     assert len((tmp_path / "boards.csv").read_text().splitlines()) == 10
     assert (tmp_path / "camera.yaml").exists() != known
     if not known:
@@ -55,4 +58,5 @@ def test_images_become_a_table_of_poses(elastocal, tmp_path, known):
 def test_without_opencv_the_extra_is_named(monkeypatch, refusal, tmp_path):
     # None makes Python raise ModuleNotFoundError, as for a package that is not there.
     monkeypatch.setitem(__import__("sys").modules, "cv2", None)
-    assert "elastocal[camera]" in refusal("board", "--pdf", tmp_path / "board.pdf")
+    message = refusal("board", "--pdf", tmp_path / "board.pdf")
+    assert "in the clone of elastocal, python -m pip install -e '.[camera]'" in message

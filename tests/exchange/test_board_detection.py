@@ -93,7 +93,7 @@ def test_images_without_the_board_are_named_and_others_count(tmp_path):
     assert detection.left_out == {"view_2.png": "0 corners"}
     assert len(detection.poses) == 2
     wrong = make_pattern("apriltag", 5, 4, 0.03)
-    with refused(tmp_path, "", "no pose (0 corners)", "board.yaml"):
+    with refused(tmp_path, "", "markers of DICT_5X5_250", "board.yaml"):
         detect_boards(find_images(tmp_path), wrong, CAMERA)
 
 
@@ -104,7 +104,7 @@ def test_unreadable_and_unequal_images_are_refused(tmp_path):
     with refused(other, "", "64 x 48 pixels", "640 x 480"):
         detect_boards(find_images(tmp_path), CHARUCO, CAMERA)
     other.write_text("no image")
-    with refused(other, "", "no readable image", ".png"):
+    with refused(other, "", "no image that OpenCV reads", ".png"):
         detect_boards(find_images(tmp_path), CHARUCO, CAMERA)
     with refused(tmp_path / "none", "", "no image", ".png"):
         find_images(tmp_path / "none")

@@ -278,6 +278,6 @@ def test_a_command_names_the_extra_of_a_package_that_is_not_installed(
     )
     assert done.returncode == 1
     assert done.stderr == (
-        f"Python: found no package {package}; allowed: an environment with it:"
-        f" pip install 'elastocal[{extra}]'\n"
+        f"Python: found no package {package}; allowed: an environment with it: in the"
+        f" clone of elastocal, python -m pip install -e '.[{extra}]'\n"
     )

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from typer import Argument, Option
 
-from elastocal.command.terminal import print_answer
+from elastocal.command.terminal import format_command, print_answer
 from elastocal.counting import format_count
 from elastocal.errors import InputError
 
@@ -61,7 +61,7 @@ def board(
             f"{description.as_posix()}: the same for elastocal detect",
             "print at 100 %; the line under the board must be 100 mm long",
         ],
-        "elastocal detect images/ --board board.yaml --output boards.csv",
+        format_command("detect", "images", "--board", description, "-o", "boards.csv"),
         Console(),
     )
 
@@ -124,7 +124,12 @@ def detect(
         f"{format_count(len(detection.poses), 'pose')} of the board in"
         f" {format_count(len(detection.poses) + len(left_out), 'image')}",
         details,
-        f"elastocal import board {output.as_posix()} --joints joints.csv"
-        " --folder campaigns/arm",
+        format_command(
+            "import",
+            "board",
+            output,
+            *("--joints", "joints.csv", "--angles", "rad"),
+            *("--folder", "campaigns/arm", "--robot", "robot.yaml"),
+        ),
         Console(),
     )

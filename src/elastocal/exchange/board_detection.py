@@ -20,6 +20,7 @@ import numpy as np
 from elastocal.errors import InputError, explain_missing_packages
 from elastocal.exchange.board_pattern import CHARUCO, BoardPattern
 from elastocal.exchange.camera_file import Camera
+from elastocal.exchange.undetected_boards import explain_undetected_board
 from elastocal.mechanics.kinematics import form_cross_matrices
 
 # Columns of the table of poses, one row for each image.
@@ -130,6 +131,8 @@ def detect_boards(
             left_out[corners.image] = f"{len(corners.on_board)} corners"
         else:
             detected.append(corners)
+    if not detected:
+        raise explain_undetected_board(paths, images, pattern)
     if camera is None:
         camera = _calibrate_camera(detected, size, paths)
     poses = []
@@ -272,7 +275,7 @@ def _read_image(path: Path) -> np.ndarray:
         import cv2
     image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
     if image is None:
-        raise InputError(path, "", "no readable image", ", ".join(SUFFIXES))
+        raise InputError(path, "", "no image that OpenCV reads", ", ".join(SUFFIXES))
     return np.asarray(image)
 
 

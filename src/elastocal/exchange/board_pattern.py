@@ -116,6 +116,6 @@ def format_pattern(pattern: BoardPattern) -> str:
     """Return the text of ``board.yaml``."""
     text: str = yaml.safe_dump(asdict(pattern), sort_keys=False)
     return (
-        "# The printed board. Measure ten squares of the print with a rule or a caliper,"
+        "# The printed board. Measure a row of its squares with a rule or a caliper,"
         "\n# and correct square_m and marker_m if the printer has changed the scale.\n"
     ) + text
