@@ -36,6 +36,22 @@ def test_a_table_is_read(tmp_path, robot, header, unit, scale):
     np.testing.assert_allclose(read_joint_angles(path, robot, unit).angles, ANGLES)
 
 
+def test_named_columns_may_stand_in_any_order(tmp_path):
+    path = tmp_path / "joints.csv"
+    # ROS publishes the names of joints in alphabetical order.
+    header = ",".join(NAMES[::-1])
+    np.savetxt(path, ANGLES[:, ::-1], delimiter=",", header=header, comments="")
+    np.testing.assert_allclose(read_joint_angles(path, NAMED, "rad").angles, ANGLES)
+
+
+def test_the_joint_without_a_column_is_named(tmp_path):
+    path = tmp_path / "joints.csv"
+    header = ",".join(NAMES[:-1])
+    np.savetxt(path, ANGLES[:, :-1], delimiter=",", header=header, comments="")
+    with refused(path, "header", "no column 'q7' or 'panda_joint7'", "a header with"):
+        read_joint_angles(path, NAMED, "rad")
+
+
 def test_joint_states_of_moveit_are_put_into_the_order_of_the_robot(tmp_path):
     path = tmp_path / "joints.yaml"
     document = {
@@ -91,3 +107,6 @@ def test_a_column_of_images_is_kept(tmp_path):
     rows = [f"{number}.png,{','.join(7 * ['0.1'])}" for number in range(2)]
     path.write_text("\n".join([f"image,{header}", *rows]) + "\n")
     assert read_joint_angles(path, ROBOT, "rad").images == ("0.png", "1.png")
+    path.write_text("\n".join([f"image,{header}", *rows, rows[0]]) + "\n")
+    with refused(path, "line 4, column image", "0.png in line 2 too", "one line"):
+        read_joint_angles(path, ROBOT, "rad")

@@ -408,10 +408,13 @@ def find_units(
         unit = given.get(name) or stated.get(name) or usual_unit or unit_of_all
         if unit is None:
             problem = f"no unit of {columns[name]!r}"
-            option = "--lengths mm" if is_length else "--angles deg"
-            raise InputError(
-                text.path, "header", problem, f"{option} or such, or --unit {name}=UNIT"
-            )
+            options = "--angles rad or --angles deg"
+            example = f"{name}_deg"
+            if is_length:
+                options = "--lengths m or --lengths mm"
+                example = f"{name}_mm"
+            allowed = f"{options}, or the unit in the header, such as {example}"
+            raise InputError(text.path, "header", problem, allowed)
         if _scale(unit, kinds) is None:
             key = f"unit of {columns[name]!r}"
             units = itertools.chain.from_iterable(UNITS[kind] for kind in kinds)

@@ -66,22 +66,39 @@ def read_joint_angles(
 
     def is_header(cells: Sequence[str]) -> bool:
         names = {recognize_column(cell)[0] for cell in cells} - {None}
-        named = {*cells} >= {*(robot.command_names or ("",))}
-        return named or bool(find_joints(name for name in names if name))
+        is_named = not {*cells}.isdisjoint(robot.command_names or ())
+        return is_named or bool(find_joints(name for name in names if name))
 
     text = read_text_table(path, is_header, wanted=_HEADER, units_in=read_units)
     columns, stated_units = find_columns(text, {}, robot)
     wanted = list_joint_columns(robot.commands)
     missing = [name for name in wanted if name not in columns]
     if missing:
-        raise InputError(path, "header", f"no column {missing[0]!r}", _HEADER)
+        problem = f"no column {missing[0]!r}"
+        if robot.command_names:
+            problem += f" or {robot.command_names[wanted.index(missing[0])]!r}"
+        raise InputError(path, "header", problem, _HEADER)
     options = {"angles": unit} if unit else {}
     units = find_units(text, columns, wanted, stated_units, options, robot)
     angles = text.cells(columns, find_scales(units)).matrix(wanted)
     if IMAGE not in text.columns:
         return JointAngles(angles)
     images = text.cells({IMAGE: IMAGE}, {}).texts(IMAGE)
+    _refuse_repeated_images(path, images, text.lines)
     return JointAngles(angles, tuple(images))
+
+
+def _refuse_repeated_images(
+    path: str | Path, images: Sequence[str], lines: Sequence[int]
+) -> None:
+    """Refuse a table in which two lines have joint angles of the same image."""
+    line_of_image: dict[str, int] = {}
+    for image, line in zip(images, lines, strict=True):
+        if image in line_of_image:
+            problem = f"{image} in line {line_of_image[image]} too"
+            allowed = "one line for each image"
+            raise InputError(path, f"line {line}, column {IMAGE}", problem, allowed)
+        line_of_image[image] = line
 
 
 def _read_joint_states(document: Any, path: str | Path, robot: Robot) -> np.ndarray:
