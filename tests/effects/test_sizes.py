@@ -10,7 +10,7 @@ from support import chain_of
 from synthetic import equipped
 
 from elastocal.effects.catalogue import candidates_on, list_bundled_effects
-from elastocal.effects.sizes import full_torque_Nm, lever_m
+from elastocal.effects.sizes import full_torque_Nm, lever_m, link_width_m
 from elastocal.mechanics.robot import Mass
 from elastocal.mechanics.sites import build_sites
 
@@ -83,6 +83,17 @@ def test_parameters_have_the_sign_of_their_size(fanuc):
         .sign
         == -1
     )
+
+
+def test_a_bearing_wobbles_by_its_shift_over_its_diameter():
+    """A tenth of the length of the arm; by hand."""
+    sites = equipped(chain_of("Rz(q1) Tz(1) Ry(q2) Tx(2) Ry(q3) Tx(0.1) [hand]"))
+    runout = list_bundled_effects()["bearing_runout"]
+    assert link_width_m(sites) == pytest.approx(0.31)
+    shift_m, wobble_rad = (runout.size(name, sites) for name in ("shift", "wobble"))
+    assert wobble_rad == pytest.approx(shift_m / 0.31)
+    # An arm without long links has bearings, too.
+    assert link_width_m(equipped(chain_of("Rz(q1) Ry(q2) Tx(0.1) [hand]"))) == 0.03
 
 
 def test_the_full_torque_has_at_least_the_lever_of_a_tool_and_includes_the_links():

@@ -23,7 +23,15 @@ from elastocal.effects.protocol import (
     turning_joints,
     waves,
 )
-from elastocal.effects.sizes import LOAD, RATED, REACH, SAG, TORQUE, Size
+from elastocal.effects.sizes import (
+    LOAD,
+    RATED,
+    REACH,
+    SAG,
+    TORQUE,
+    Size,
+    link_width_m,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -46,8 +54,6 @@ _OFF_THE_LINE = "off the line"
 # gripper from the flange.
 _CENTRE_OFFSET_M = 0.2
 _GRIPPER_LEVER_M = 0.2
-# Width of links over the length of the arm (KUKA KR 270: 0.3 m of 2.7 m).
-_WIDTH_OF_LENGTH = 0.1
 # Lower bound on the standard deviation of a centre of mass across its link: motors and
 # gears shift the centre of a slender link this far.
 _LEAST_CENTRE_STD_M = 0.04
@@ -79,7 +85,7 @@ def declared_weight(sites: Sites) -> Candidate:
     def law(conditions: Conditions) -> Displacements:
         return _list_by_joint(conditions.mass_torques, conditions.compliance)
 
-    width = _WIDTH_OF_LENGTH * float(np.linalg.norm(sites.link_vectors_m, axis=1).sum())
+    width = link_width_m(sites)
     parameters: list[Parameter] = []
     for mass in sites.masses:
         error = mass.relative_std * mass.mass_kg

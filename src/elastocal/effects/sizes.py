@@ -32,11 +32,14 @@ TORQUE = "joint's turn under its full torque"
 RATED = "rated load"
 LOAD = "weight of the rated load"
 SAG = "joint's compliance times the rated load"
+OVER_WIDTH = "1 m over the width of the links"
 # Length of the carriage of a prismatic joint. It tilts by its compliance over the square of
 # this length.
 _CARRIAGE_M = 0.3
 # Lower bound on the reach, for arms whose links are not long.
 _SHORTEST_REACH_M = 0.3
+# Width of links over the length of the arm (KUKA KR 270: 0.3 m of 2.7 m).
+_WIDTH_OF_LENGTH = 0.1
 # Lower bound on the lever of a load: the length of a tool.
 _LEAST_LEVER_M = 0.5
 # Usual ratio of the rated payload to the mass of an arm.
@@ -89,6 +92,12 @@ def lever_m(sites: Sites, joint: int) -> float:
     return max(_length_beyond(sites, joint), _LEAST_LEVER_M)
 
 
+def link_width_m(sites: Sites) -> float:
+    """Estimate the width of the links, which is also the diameter of their bearings."""
+    length_m = float(np.linalg.norm(sites.link_vectors_m, axis=1).sum())
+    return _WIDTH_OF_LENGTH * max(length_m, _SHORTEST_REACH_M)
+
+
 def full_torque_Nm(sites: Sites, joint: int) -> float:  # noqa: N802 - units in names keep their case
     """Torque on a joint, from 0, by the rated payload and the links behind it, each at its
     longest lever."""
@@ -129,4 +138,5 @@ _UNITS: dict[str, Callable[[Sites, tuple[int, ...]], float]] = {
     RATED: lambda sites, joints: rated_kg(sites),
     LOAD: lambda sites, joints: rated_kg(sites) * standard_gravity,
     SAG: lambda sites, joints: _mean_compliance(sites, joints) * rated_kg(sites),
+    OVER_WIDTH: lambda sites, joints: 1.0 / link_width_m(sites),
 }

@@ -16,7 +16,7 @@ from elastocal.effects.protocol import (
     turning_joints,
     waves,
 )
-from elastocal.effects.sizes import Size
+from elastocal.effects.sizes import OVER_WIDTH, Size
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -251,7 +251,7 @@ def motor_eccentricity(entry: Effect, sites: Sites, joint: int) -> Candidates:
 @_effect(
     "bearing runout",
     Size("shift", 5e-5, "slewing bearings have hundredths of a millimetre"),
-    Size("wobble", 5e-5, "the same over the diameter of the bearing"),
+    Size("wobble", 5e-5, "the same over the diameter of the bearing", of=OVER_WIDTH),
     at=lambda sites: [
         (joint, motion)
         for motion in ("radial", "axial", "wobble")
