@@ -5,10 +5,13 @@ A simulated UR10 with errors of its geometry, which the campaign declares, is me
 each kind: a ball in three sockets, a tip on three planes, a draw wire from three anchors,
 and a camera on the flange before a board, whose noise is estimated or declared, and whose
 frame has its origin in the middle or, as OpenCV has it, at a corner. Every
-second robot also has a clear effect at a joint that is drawn. The oracle knows effect,
-joint and noise, and tests the effect on the same data. `python benchmarks/instruments.py
-CASES SEED [KIND ...]` prints a row a kind with 95 % intervals (Clopper and Pearson, 1934),
-some three seconds a case.
+second robot also has an effect at a joint that is drawn, as large as in a bad case of
+makers' data, or several times larger. The oracle knows effect, joint and noise, tests the
+effect on the same data, and finds the other mechanisms that these data do not exclude.
+The error of the corrected robot is that of its true tip at the held-out joint angles,
+after the best placement of base and tool; its floor is the same error of the oracle's fit.
+`python benchmarks/instruments.py CASES SEED [KIND ...]` prints a row a kind and a row an
+effect with 95 % intervals (Clopper and Pearson, 1934), some three seconds a case.
 """
 
 from dataclasses import dataclass, replace
@@ -20,12 +23,25 @@ import numpy as np
 from common import ROBOTS
 from rates import format_rate, make_parser
 from scipy.spatial.transform import Rotation
+from scipy.stats import quantile_test
 
+from elastocal.application.calibrated import CalibratedRobot, predict_poses
+from elastocal.application.frames import (
+    ROBOT,
+    Scope,
+    root_mean_square,
+    subtract_placement,
+)
+from elastocal.application.scope import calibrate_on_case
 from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.writing import write_campaign
-from elastocal.loop.whole import diagnose_folder
+from elastocal.diagnosis.diagnose import diagnose
+from elastocal.diagnosis.settings import Settings
+from elastocal.fitting.model import Case
+from elastocal.fitting.noise import parse_noise
+from elastocal.loop.whole import build_calibrated_robot, judge_and_predict, read_cases
 from elastocal.mechanics.kinematics import compute_point_poses
-from elastocal_proof.blind.oracle import fit_oracle
+from elastocal_proof.blind.oracle import fit_true_effects
 from elastocal_proof.plant.arm import read_arm
 from elastocal_proof.plant.contacts import (
     Workshop,
@@ -42,15 +58,21 @@ from elastocal_proof.plant.simulated_robot import (
     simulate_poses,
 )
 
-ROBOT = "ur10"
-# Effects that act on a robot without a load, and their sizes in plausible sizes: some ten
-# times the noise at the tool.
-TIMES = {
-    "transmission_harmonic": 10.0,
-    "transmission_ratio": 5.0,
-    "bearing_runout": 10.0,
-    "link_weight": 3.0,
+ARM = "ur10"
+# Effects that act on a robot without a load, with their sizes in those of `KINDS`. Gears
+# have waves of at most an arc minute, bearings tenths of a millimetre. Those that are
+# called large exceed this some two to four times, so that no machine of this class has
+# them.
+EFFECTS = {
+    "ratio wrong by 1.5e-3": ("transmission_ratio", 5.0),
+    "harmonics of 0.2 mrad": ("transmission_harmonic", 2.5),
+    "harmonics of 0.8 mrad (large)": ("transmission_harmonic", 10.0),
+    "runout of 0.15 mm and 1 mrad": ("bearing_runout", 5.0),
+    "runout of 0.3 mm and 2 mrad (large)": ("bearing_runout", 10.0),
+    "link weight": ("link_weight", 3.0),
 }
+# The corrected robot shall come this close to the floor (issue 66).
+NEAR_FLOOR = 1.3
 # An effect is at one of the first joints, because those behind hardly move the tool.
 LAST_JOINT = 4
 # Standard deviations of the declared errors of each joint and link.
@@ -87,7 +109,7 @@ class Measured:
 
 def open_workshop(seed, defects):
     """Place a robot with errors of its geometry and with defects in a workshop."""
-    arm = read_arm(ROBOTS / f"{ROBOT}.yaml")
+    arm = read_arm(ROBOTS / f"{ARM}.yaml")
     draws = np.random.default_rng([seed, 1])
     declared = []
     for joint in range(1, arm.joints + 1):
@@ -96,7 +118,7 @@ def open_workshop(seed, defects):
         declared += [offset, length]
     robot = apply_defects(draw_specimen(arm, seed, weighs=False), [*declared, *defects])
     limits = np.column_stack([MIDDLE_RAD - HALF_RANGE_RAD, MIDDLE_RAD + HALF_RANGE_RAD])
-    chain = read_robot(ROBOTS / f"{ROBOT}.yaml").chain
+    chain = read_robot(ROBOTS / f"{ARM}.yaml").chain
     tool = replace(chain.end_effector, offset_m=tuple(TOOL_M.tolist()))
     return Workshop(
         partial(locate_tool, robot),
@@ -227,7 +249,7 @@ def write_case(folder, kind, workshop):
     table |= {f"q{joint}": row for joint, row in enumerate(measured.angles.T, 1)}
     document = {
         "campaign": "instruments",
-        "robot": ROBOT,
+        "robot": ARM,
         "measured": kind.partition("_")[0],
         "compliance": "nominal",
         "declared": ["joint_offset", "link_geometry"],
@@ -238,99 +260,215 @@ def write_case(folder, kind, workshop):
     write_campaign(folder, document, table | measured.columns, joints, "csv")
 
 
-def diagnose_case(kind, seed, effect):
-    """Diagnose one robot; return verdict.json, the defects and the oracle's outcome."""
-    arm = read_arm(ROBOTS / f"{ROBOT}.yaml")
-    defects = []
-    if effect:
-        locations = [
-            joints
-            for joints in KINDS[effect].locations(arm)
-            if max(joints) <= LAST_JOINT
-        ]
-        joints = locations[np.random.default_rng([seed, 3]).integers(len(locations))]
-        size = TIMES[effect] * KINDS[effect].scale_plausible_size(arm)
-        defects = [Defect(effect, joints, size, seed)]
+@dataclass(frozen=True)
+class Diagnosed:
+    """One robot after its diagnosis.
+
+    Attributes
+    ----------
+    workshop : the robot.
+    training, held_out : its fitted and held-out measurements.
+    verdict : contents of verdict.json.
+    corrected : the robot as the diagnosis corrects it.
+    """
+
+    workshop: Workshop
+    training: Case
+    held_out: Case
+    verdict: dict
+    corrected: CalibratedRobot
+
+    def compute_true_error_m(self, calibrated):
+        """RMS distance of the true tip from where a model puts it, at the held-out joint
+        angles, after the best placement of base and tool."""
+        states = self.held_out.observations.states
+        angles = self.held_out.campaign.robot.reported_angles(states.joint_angles)
+        position, rotation = predict_poses(calibrated, angles)
+        tip = position + rotation @ TOOL_M
+        displacement = np.zeros((len(tip), 6, 1))
+        displacement[:, :3, 0] = self.workshop.locate(angles)[0] - tip
+        scope = Scope(ROBOT, tip.mean(axis=0), offset_removed=True)
+        errors = subtract_placement(scope, tip, rotation, displacement)
+        return root_mean_square(errors[:, :3, 0])
+
+
+def draw_defect(effect, seed):
+    """Draw the location of an effect."""
+    mechanism, times = EFFECTS[effect]
+    arm = read_arm(ROBOTS / f"{ARM}.yaml")
+    kind = KINDS[mechanism]
+    locations = [joints for joints in kind.locations(arm) if max(joints) <= LAST_JOINT]
+    joints = locations[np.random.default_rng([seed, 3]).integers(len(locations))]
+    return Defect(mechanism, joints, times * kind.scale_plausible_size(arm), seed)
+
+
+def diagnose_case(kind, seed, defects):
+    """Measure, diagnose and correct one robot."""
+    workshop = open_workshop(seed, defects)
     with TemporaryDirectory() as parent:
         folder = Path(parent) / "instruments"
-        write_case(folder, kind, open_workshop(seed, defects))
-        verdict = diagnose_folder(folder, ROBOTS, seed)
-        truth = {"defects": [vars(defect) for defect in defects]}
-        oracle = fit_oracle(truth, verdict, folder, ROBOTS, seed) if defects else None
-    return verdict, defects, oracle
+        write_case(folder, kind, workshop)
+        training, held_out = read_cases(folder, ROBOTS)
+    diagnosis = diagnose(training, Settings(), seed)
+    judgement = judge_and_predict(diagnosis, held_out, seed)
+    corrected = build_calibrated_robot(
+        diagnosis, judgement.held_out, judgement.delivered
+    )
+    return Diagnosed(workshop, training, held_out, judgement.document, corrected)
+
+
+def ask_oracle(robot, defects):
+    """Fit the true effects; return the oracle's fit and its true error."""
+    noise = parse_noise(robot.verdict).without_pose_error
+    oracle = fit_true_effects(
+        robot.training, noise, [vars(defect) for defect in defects]
+    )
+    fitted = oracle.fitted
+    calibrated = calibrate_on_case(
+        robot.training, fitted.model, fitted.estimate, fitted.covariance, fitted.noise
+    )
+    return oracle, robot.compute_true_error_m(calibrated)
 
 
 @dataclass(frozen=True)
 class Outcome:
     """What a diagnosis says of one robot.
 
-    `near` is the held-out RMS error over that of the oracle.
+    Attributes
+    ----------
+    effect : one of `EFFECTS`, or None.
+    mechanism : its name in the catalogue.
+    names : what the verdict states.
+    has_alternatives : whether it lists alternatives beside a name.
+    alarm : whether it states that anything is missing.
+    detected : whether the oracle detects the effect.
+    distinguishable : whether it excludes every other mechanism too.
+    error_m, floor_m : true error of the corrected robot, and of the oracle's fit.
     """
 
     effect: str | None
+    mechanism: str | None
     names: set
+    has_alternatives: bool
     alarm: bool
     detected: bool = False
-    near: float = np.nan
+    distinguishable: bool = False
+    error_m: float = np.nan
+    floor_m: float = np.nan
 
     @property
-    def named(self):
-        """Whether the effect is named, and nothing else."""
-        return self.names == {self.effect}
+    def ratio(self):
+        """True error of the corrected robot over the least that can be expected."""
+        return self.error_m / self.floor_m
 
     @property
-    def misnamed(self):
-        """Whether one other effect is named alone."""
-        return len(self.names) == 1 and not self.named
+    def is_first(self):
+        """Whether the effect is named, and no other effect."""
+        return self.names == {self.mechanism}
+
+    @property
+    def is_alone(self):
+        """Whether the effect is named, without alternatives."""
+        return self.is_first and not self.has_alternatives
+
+    @property
+    def is_wrong(self):
+        """Whether one other effect is named."""
+        return len(self.names) == 1 and not self.is_first
+
+    @property
+    def is_wrong_alone(self):
+        """Whether one other effect is named, without alternatives."""
+        return self.is_wrong and not self.has_alternatives
+
+    @property
+    def is_near_floor(self):
+        """Whether the corrected robot is about as accurate as the measurements allow."""
+        return self.ratio <= NEAR_FLOOR
 
 
 def study_case(kind, number, seed, *, each):
     """Diagnose one robot of a kind; every second one has an effect."""
-    effect = list(TIMES)[number // 2 % len(TIMES)] if number % 2 else None
-    verdict, defects, oracle = diagnose_case(kind, seed, effect)
-    names = {found["name"] for found in verdict["effects"]}
+    effect = list(EFFECTS)[number // 2 % len(EFFECTS)] if number % 2 else None
+    defects = [draw_defect(effect, seed)] if effect else []
+    robot = diagnose_case(kind, seed, defects)
+    stated = robot.verdict["effects"]
+    outcome = Outcome(
+        effect,
+        defects[0].effect if defects else None,
+        {entry["name"] for entry in stated},
+        any(entry["alternatives"] for entry in stated),
+        robot.verdict["verdict"] not in ("adequate", "not_testable"),
+    )
+    if defects:
+        oracle, floor_m = ask_oracle(robot, defects)
+        outcome = replace(
+            outcome,
+            detected=oracle.detected,
+            distinguishable=oracle.excludes_others,
+            error_m=robot.compute_true_error_m(robot.corrected),
+            floor_m=floor_m,
+        )
     if each:
         joints = [defect.joints for defect in defects]
-        p_value = oracle and oracle["p_value"]
-        print(
-            kind, seed, effect, joints, p_value, verdict["verdict"], names, flush=True
-        )
-    alarm = verdict["verdict"] not in ("adequate", "not_testable")
-    if effect is None:
-        return Outcome(effect, names, alarm)
-    near = verdict["heldout"]["after"]["rms_m"] / oracle["heldout"]["rms_m"]
-    return Outcome(effect, names, alarm, oracle["detected"], near)
+        print(kind, seed, joints, robot.verdict["verdict"], outcome, flush=True)
+    return outcome
 
 
-def format_row(kind, outcomes):
-    """Format the rates of a kind as a row."""
+def format_row(label, outcomes):
+    """Format the rates of some robots as a row."""
     nulls = [outcome for outcome in outcomes if outcome.effect is None]
     effects = [outcome for outcome in outcomes if outcome.effect]
-    detected = [outcome for outcome in effects if outcome.detected]
-    near = np.median([outcome.near for outcome in detected]) if detected else np.nan
     cells = [
-        kind,
+        label,
         format_rate(outcome.alarm for outcome in nulls),
-        format_rate(outcome.detected for outcome in effects),
-        format_rate(outcome.alarm for outcome in detected),
-        format_rate(outcome.named for outcome in detected),
-        format_rate(outcome.misnamed for outcome in effects),
-        f"{near:.2f}",
+        *format_names(effects),
+        format_rate(outcome.is_near_floor for outcome in effects),
+        format_median([outcome.ratio for outcome in effects]),
+        format_median([1e3 * outcome.floor_m for outcome in effects]),
     ]
     return f"| {' | '.join(cells)} |"
 
 
+def format_names(effects):
+    """Format how often effects are detected and named, and others instead of them."""
+    detected = [outcome for outcome in effects if outcome.detected]
+    distinguishable = [outcome for outcome in detected if outcome.distinguishable]
+    return [
+        format_rate(outcome.detected for outcome in effects),
+        format_rate(outcome.alarm for outcome in detected),
+        format_rate(outcome.is_first for outcome in detected),
+        format_rate(outcome.distinguishable for outcome in detected),
+        format_rate(outcome.is_alone for outcome in distinguishable),
+        format_rate(outcome.is_wrong for outcome in effects),
+        format_rate(outcome.is_wrong_alone for outcome in effects),
+    ]
+
+
+def format_median(values):
+    """Format a median with its interval of 95 %, by order statistics."""
+    if not values:
+        return ""
+    interval = quantile_test(values, q=np.median(values)).confidence_interval()
+    return f"{np.median(values):.2f} ({interval.low:.2f}-{interval.high:.2f})"
+
+
 def main():
-    """Print the rows of the kinds."""
+    """Print the rows of the kinds and of the effects."""
     arguments = make_parser(__doc__, tuple(INSTRUMENTS)).parse_args()
     heads = [
-        "kind",
+        "kind or effect",
         "false alarms",
         "the oracle detects",
         "alarm, of those",
-        "named alone, of those",
-        "another name alone",
-        "held-out RMS over the oracle's",
+        "true mechanism named, of those",
+        "the oracle excludes all others, of those",
+        "true mechanism alone, of the latter",
+        "another mechanism named",
+        "another mechanism alone",
+        f"true error up to {NEAR_FLOOR:g} times the floor",
+        "median ratio",
+        "median floor, mm",
     ]
     print(f"| {' | '.join(heads)} |\n{'|---' * len(heads)}|", flush=True)
     everything = []
@@ -342,13 +480,9 @@ def main():
         everything += outcomes
         print(format_row(kind, outcomes), flush=True)
     print(format_row("all", everything))
-    for effect in TIMES:
-        named = [
-            outcome.named
-            for outcome in everything
-            if outcome.detected and outcome.effect == effect
-        ]
-        print(f"{effect}: named alone, of those detected: {format_rate(named)}")
+    for effect in EFFECTS:
+        outcomes = [outcome for outcome in everything if outcome.effect == effect]
+        print(format_row(effect, outcomes))
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from elastocal.mechanics.sites import build_sites
 from elastocal_proof.blind import oracle
 from elastocal_proof.blind.cases import BlindCase, write_sealed_case
 from elastocal_proof.blind.oracle import (
+    OracleFit,
     fit_oracle,
     list_variants,
 )
@@ -82,3 +83,20 @@ def test_the_oracle_fits_what_the_diagnosis_names_rightly(tmp_path, monkeypatch)
     without_effect = fit_oracle({"defects": []}, verdict, folder, ROBOTS.as_posix(), 1)
     assert without_effect["heldout"] == verdict["heldout"]["declared"]
     assert not without_effect["detected"]
+
+
+@pytest.mark.parametrize(
+    ("p_value", "alternatives", "detected", "excludes_others"),
+    [
+        (1e-6, [], True, True),
+        (1e-6, ["link_geometry"], True, False),
+        (1e-6, None, True, False),
+        (0.5, None, False, False),
+    ],
+)
+def test_an_oracle_without_alternatives_excludes_all_others(
+    p_value, alternatives, detected, excludes_others
+):
+    oracle_fit = OracleFit(None, [], p_value, alternatives)
+    assert oracle_fit.detected == detected
+    assert oracle_fit.excludes_others == excludes_others

@@ -9,6 +9,7 @@ smaller errors by chance.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from elastocal.diagnosis.diagnose import Step
@@ -36,6 +37,40 @@ if TYPE_CHECKING:
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Case
+    from elastocal.fitting.noise import Noise
+
+
+@dataclass(frozen=True)
+class OracleFit:
+    """The declared model with the true effects, fitted by an analyst who knows them.
+
+    Attributes
+    ----------
+    fitted
+        The fit.
+    candidates
+        Candidates of the true effects in it.
+    p_value
+        Of all their coefficients at once; 1 if the data identify none of them.
+    alternatives
+        Other mechanisms beside which the true one is not significant; None if it is not
+        detected or if there are several.
+    """
+
+    fitted: Fit
+    candidates: list[Candidate]
+    p_value: float
+    alternatives: list[str] | None
+
+    @property
+    def detected(self) -> bool:
+        """Whether the true effects are significant."""
+        return self.p_value < LEVEL
+
+    @property
+    def excludes_others(self) -> bool:
+        """Whether the measurements exclude every other mechanism as the only cause."""
+        return self.alternatives == []
 
 
 def fit_oracle(
@@ -82,29 +117,57 @@ def fit_oracle(
         return _describe_outcome([], 1.0, None, verdict["heldout"]["declared"])
     case, held_out = read_cases(folder, robots_folder)
     noise = parse_noise(verdict).without_pose_error
+    oracle = fit_true_effects(case, noise, defects)
+    outside = find_extrapolated_poses(oracle.fitted, case, held_out)
+    _, heldout, _ = compare_held_out_errors(
+        [Step("oracle", "declared", oracle.fitted)],
+        (case, held_out),
+        outside,
+        noise,
+        seed,
+    )
+    return _describe_outcome(
+        oracle.candidates,
+        oracle.p_value,
+        oracle.alternatives,
+        to_document(heldout.declared),
+    )
+
+
+def fit_true_effects(
+    case: Case, noise: Noise, defects: Sequence[Mapping[str, Any]]
+) -> OracleFit:
+    """Fit the true effects to the fitted measurements of one case, test them, and find
+    the mechanisms that these measurements do not exclude.
+
+    Parameters
+    ----------
+    case
+        The fitted measurements.
+    noise
+        Noise that the verdict states.
+    defects
+        The true effects, each with ``effect`` and ``joints``; all are in the catalogue.
+    """
     declared = fit_declared_model(case.model, case.observations, noise)
     selected: list[ScoredCandidate] = []
     variants = 1
     for defect in defects:
-        alternatives = _score_variants(
+        scored_variants = _score_variants(
             declared, case, defect["effect"], defect["joints"]
         )
-        if alternatives:
-            variants *= len(alternatives)
-            selected += max(alternatives, key=_sum_log_bayes_factors)
+        if scored_variants:
+            variants *= len(scored_variants)
+            selected += max(scored_variants, key=_sum_log_bayes_factors)
     fitted = fit_scored_candidates(declared, case.observations, selected)
     candidates = [scored.candidate for scored in selected]
     p_value = min(variants * compute_wald_p_value(fitted, candidates), 1.0)
-    others = None
+    alternatives = None
     if p_value < LEVEL and len({defect["effect"] for defect in defects}) == 1:
-        others = find_alternatives(
+        alternatives = find_alternatives(
             declared, case.observations, case.candidates.values(), selected
         )
-    outside = find_extrapolated_poses(fitted, case, held_out)
-    _, heldout, _ = compare_held_out_errors(
-        [Step("oracle", "declared", fitted)], (case, held_out), outside, noise, seed
-    )
-    return _describe_outcome(candidates, p_value, others, to_document(heldout.declared))
+    return OracleFit(fitted, candidates, p_value, alternatives)
 
 
 def list_variants(
