@@ -1,7 +1,8 @@
 """Calibrate an arm of a Motoman from contacts alone, and judge it by a Leica.
 
-Usage: python benchmarks/peers/motoman_contacts.py FOLDER, a clone of
-ctu-vras/multirobot-calibration at commit a20f0454, from the top of this repository.
+Usage: python benchmarks/peers/motoman_contacts.py FOLDER [VARIANT ...], FOLDER a clone of
+ctu-vras/multirobot-calibration at commit a20f0454, from the top of this repository; all
+variants by default.
 
 The right arm touched two horizontal tables and a wall with the faces of an icosahedron,
 whose centre is then at a constant distance from the plane, and the icosahedron of the
@@ -98,32 +99,38 @@ VARIANTS = tuple(
 )
 
 
-def main(folder: Path) -> None:
+def main(folder: Path, labels: list[str]) -> None:
     """Print a line for each model and each set of measurements of the tracker."""
     importers = read_importers(IMPORTERS)
+    judges = read_judges(folder / DATA, importers["motoman"])
+    print("model; judge; poses; RMS (95 %), mm; largest, mm", flush=True)
     with tempfile.TemporaryDirectory() as scratch_name:
         scratch = Path(scratch_name)
-        judges = read_judges(folder / DATA, importers["motoman"])
-        print("model; judge; poses; RMS (95 %), mm; largest, mm")
-        report_references(folder, scratch, judges)
+        if not labels:
+            report_references(folder, scratch, judges)
         for variant in VARIANTS:
-            importer = importers[variant.importer]
-            contacts = write_contacts(scratch, folder / DATA, importer, variant)
-            cases = {
-                name: write_judge(scratch, f"{variant} {name}", measured, importer)
-                for name, measured in judges.items()
-            }
-            models = {
-                f"{variant}, geometry": fit(contacts),
-                f"{variant}, diagnosis": diagnose(contacts, Settings(), SEED).final,
-            }
-            touches_of_tables = select_tables(contacts)
-            for model, fitted in models.items():
-                error_m = predict_tip_error(fitted, touches_of_tables)
-                if error_m is not None:
-                    print(f"{model}; predicted by the fit itself; {1e3 * error_m:.3f}")
-                for name, case in cases.items():
-                    report(model, name, fitted, contacts, case)
+            if not labels or variant.label in labels:
+                importer = importers[variant.importer]
+                contacts = write_contacts(scratch, folder / DATA, importer, variant)
+                cases = {
+                    name: write_judge(scratch, f"{variant} {name}", measured, importer)
+                    for name, measured in judges.items()
+                }
+                report_model(f"{variant}, geometry", fit(contacts), contacts, cases)
+                final = diagnose(contacts, Settings(), SEED).final
+                report_model(f"{variant}, diagnosis", final, contacts, cases)
+
+
+def report_model(
+    model: str, fitted: Fit, contacts: Case, cases: dict[str, Case]
+) -> None:
+    """Print the error of the tip that a fit of contacts predicts, and the errors that
+    each set of measurements of the tracker shows."""
+    error_m = predict_tip_error(fitted, select_tables(contacts))
+    if error_m is not None:
+        print(f"{model}; predicted by the fit itself; {1e3 * error_m:.3f}", flush=True)
+    for name, case in cases.items():
+        report(model, name, fitted, contacts, case)
 
 
 def report_references(
@@ -359,4 +366,4 @@ def report(model: str, judge: str, fitted: Fit, case: Case, test_case: Case) -> 
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), sys.argv[2:])

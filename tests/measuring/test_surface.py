@@ -47,9 +47,9 @@ def test_the_field_has_the_stated_deviation_and_a_matern_covariance(flat):
     covariance = (columns * deviations**2) @ columns.T
     middle = 40
     assert covariance[middle, middle] == pytest.approx(4e-8, rel=0.1)
-    # The form changes over a quarter of the width of the touched area, 0.1 m.
+    # The form changes over 0.15 of the width of the touched area, 0.06 m.
     distance = np.linalg.norm(PLACES_M - PLACES_M[middle], axis=1)
-    scaled = np.sqrt(3.0) * distance / 0.1
+    scaled = np.sqrt(3.0) * distance / 0.06
     expected = (1.0 + scaled) * np.exp(-scaled)
     correlation = covariance[middle] / covariance[middle, middle]
     np.testing.assert_allclose(correlation, expected, atol=0.06)

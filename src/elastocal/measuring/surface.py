@@ -39,14 +39,16 @@ if TYPE_CHECKING:
 # Form of an ordinary table top or a wall: some tenths of a millimetre.
 _FORM_STD_M = 3e-4
 _LARGEST_FORM_M = 0.01
-# Distance over which the form changes, of the width of the touched area. Touches at five
-# places along the area do not show shorter waves.
-_LENGTH_SHARE = 0.25
+# Distance over which the form changes, of the width of the touched area: at two of five
+# places along the area, the heights are then nearly independent. Longer waves are fitted
+# as exactly with this length, shorter ones far better than with a larger one
+# (benchmarks/wavy_planes.py).
+_LENGTH_SHARE = 0.15
 # Half the width of the square over that of the touched area: at its edge all waves are
 # zero, which the touches must not notice.
 _MARGIN = 1.4
-# Waves along one side. Shorter ones have less than a thousandth of the variance.
-_WAVES = 9
+# Half waves along one side: the shortest are half as long as the distance of five places.
+_WAVES = 12
 # Half the width of the square of a feature that is touched at one point, m.
 _SMALLEST_M = 1e-3
 _NORMAL = slice(0, 4)
