@@ -1,8 +1,8 @@
 """Calibrate an arm of a Motoman from contacts alone, and judge it by a Leica.
 
 Usage: python benchmarks/peers/motoman_contacts.py FOLDER [VARIANT ...], FOLDER a clone of
-ctu-vras/multirobot-calibration at commit a20f0454, from the top of this repository; all
-variants by default.
+ctu-vras/multirobot-calibration at commit a20f0454, from the top of this repository. A
+VARIANT is "references" or one of `VARIANTS`, such as "surfaces"; all by default.
 
 The right arm touched two horizontal tables and a wall with the faces of an icosahedron,
 whose centre is then at a constant distance from the plane, and the icosahedron of the
@@ -65,6 +65,8 @@ NORMAL_STD_RAD = 0.005
 # Joint angles of the left arm while the tracker measured the right one, rad.
 PARKED_RAD = (1.5, 0.0, 0.0, 0.0, 0.0, 0.0)
 JOINTS = 6
+# Argument of the command for the lines without a calibration from contacts.
+REFERENCES = "references"
 REPLICATES = 1000
 SEED = 1
 
@@ -106,7 +108,7 @@ def main(folder: Path, labels: list[str]) -> None:
     print("model; judge; poses; RMS (95 %), mm; largest, mm", flush=True)
     with tempfile.TemporaryDirectory() as scratch_name:
         scratch = Path(scratch_name)
-        if not labels:
+        if not labels or REFERENCES in labels:
             report_references(folder, scratch, judges)
         for variant in VARIANTS:
             if not labels or variant.label in labels:
