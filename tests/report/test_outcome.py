@@ -29,7 +29,7 @@ def test_the_outcome_names_reports_and_verdicts(tmp_path):
     )
     advice = 'next: "What to do now" on the first page of the report'
     assert following_lines == [
-        "  report: reports/loop/cell7/report.pdf",
+        f"  report: {tmp_path}/reports/loop/cell7/report.pdf",
         "the study: reports/study.pdf",
         advice,
     ]
@@ -39,6 +39,13 @@ def test_the_outcome_names_reports_and_verdicts(tmp_path):
     assert lines["named"][-1] == (
         "next: elastocal correct 'my cells/cell7' path.csv --output targets.csv"
     )
+
+
+def test_the_error_of_a_campaign_of_contacts_is_no_position_error():
+    verdict = CAMPAIGNS["named"]
+    contacts = replace(verdict.heldout, error="distance from the plane")
+    headline = describe_verdict("cell7", replace(verdict, heldout=contacts))[1]
+    assert headline.endswith(", RMS distance from the plane on 10 validation poses")
 
 
 def test_each_warning_of_a_diagnosis_is_a_line():

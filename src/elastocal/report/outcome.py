@@ -35,7 +35,8 @@ def describe_outcome(
     made : iterable of str
         Files, relative to the workplace.
     workplace : str or path
-        Folder of the run.
+        Folder of the run. A report is named with it, because a user may have called the
+        command in another folder.
     folder : str or path
         Folder of the campaign, for the next command.
     """
@@ -47,7 +48,8 @@ def describe_outcome(
         match = _CAMPAIGN.fullmatch(path)
         if match:
             verdict = read_verdict(Path(workplace, path).with_name("verdict.json"))
-            lines += [*describe_verdict(match[1], verdict), f"  report: {path}"]
+            report = Path(workplace, path).resolve()
+            lines += [*describe_verdict(match[1], verdict), f"  report: {report}"]
             advice.append(_advise(verdict, folder))
     # With several campaigns, each report has its own advice.
     return lines + advice if len(advice) == 1 else lines
