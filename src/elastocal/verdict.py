@@ -336,6 +336,8 @@ class HeldOut:
         Errors of the robot as it is corrected, the regression included.
     in_camera : BoardErrors or None
         Errors of the board in the camera; None if no camera measures.
+    error : str
+        What an error is, in words: of a position, or the distance from a socket.
     """
 
     before: ErrorsBefore
@@ -352,6 +354,7 @@ class HeldOut:
     with_gross_errors: BeforeAfter | None
     delivered: ErrorSummary
     in_camera: BoardErrors | None = field(default=None, metadata=OMITTED_BY_DEFAULT)
+    error: str = field(default="position error", metadata=OMITTED_BY_DEFAULT)
 
 
 @dataclass(frozen=True)

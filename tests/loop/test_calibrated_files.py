@@ -250,5 +250,5 @@ def test_contacts_certify_no_robot(tmp_path):
     rows = [{"angles": np.full(6, 0.1 * row), "feature": "socket"} for row in range(20)]
     folder = write_contacts(tmp_path / "cell", document, rows)
     campaign = SimpleNamespace(folder=folder, case=build_contact_case(folder))
-    with refused(folder.source, "measured", "point", "elastocal verify"):
+    with refused(folder.source, "measured", "point", "elastocal export states"):
         build_certificate(campaign, 1e-3, 0.05)

@@ -42,6 +42,12 @@ def test_the_table_states_what_was_read_and_what_is_testable(
     assert not find_sentences(overview, "poses are few")
 
 
+def test_a_camera_has_no_tracker_frame():
+    overview = inspect_campaign(ROBOTS.parents[1] / "data/measured/fr3_board", ROBOTS)
+    texts = [text for _, text in overview.rows]
+    assert "board of camera in a frame that is fitted in each session" in texts
+
+
 def test_a_negative_compliance_is_reported(kuka, tmp_path):
     """It means that the declared model lacks an effect."""
     table = make_table(

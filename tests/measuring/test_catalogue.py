@@ -11,3 +11,4 @@ def test_every_kind_of_the_package_is_found_and_says_what_it_measures():
         assert kind.name == name
         assert kind.numbers in (1, 3, 6)
         assert kind.meaning
+        assert kind.error != "residual"

@@ -38,6 +38,7 @@ def test_kinds_of_equal_numbers_keep_whole_rows_and_others_are_split():
     plan = parse_measuring(document, "c")
     assert plan.rows == 3
     assert [channel.feature for channel in plan.channels] == [None, 0]
+    assert plan.error == "position error or distance from the touched place"
 
 
 def test_three_distances_are_a_triangle_with_standard_deviations_by_propagation():

@@ -33,7 +33,7 @@ def format_accuracy(accuracy: Accuracy) -> str:
     text = (
         f"Predicted position error of the corrected robot {frame}: {rms} RMS over"
         f" {accuracy.region} ({accuracy.poses}), {worst} at the worst of them,"
-        " without the tracker's noise."
+        " without the noise of the measurements."
     )
     if accuracy.left_out:
         effects = list_effects()

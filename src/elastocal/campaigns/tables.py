@@ -388,7 +388,7 @@ def _read_lines(
     characters and marks that change the direction of writing are refused.
     """
     content = read_bytes(
-        path, LARGEST_BYTES, "a table with a line for each measurement"
+        path, LARGEST_BYTES, "the path of a table, one line for each pose"
     )
     foreign_lines = read_foreign_lines(content, path, stated.sheet, has_names=has_names)
     encoding = "utf-8"

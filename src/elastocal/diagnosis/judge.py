@@ -381,6 +381,7 @@ def compare_held_out_errors(
         with_gross_errors=None,
         delivered=after,
         in_camera=_summarize_in_camera(transferred, held_out),
+        error=held_out.campaign.measuring.error,
     )
     return (
         rows,

@@ -253,7 +253,8 @@ def build_certificate(
     if not plan.is_tracked:
         allowed = (
             "position or pose, measured by an instrument: only those show accuracy; "
-            "elastocal verify compares the corrected robot with such positions"
+            "elastocal export states the predicted error, and elastocal verify compares "
+            "the corrected robot with such positions"
         )
         found = " and ".join(kind.name for kind in plan.kinds)
         raise InputError(campaign.folder.source, "measured", found, allowed)

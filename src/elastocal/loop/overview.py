@@ -250,7 +250,7 @@ def _describe_measurements(
     targets = ", ".join(target.name for target in campaign.targets)
     kinds = " and ".join(kind.name for kind in campaign.measuring.kinds)
     frame = f"the {campaign.frame} frame"
-    if campaign.measuring.channels and campaign.frame == "tracker":
+    if campaign.frame == "tracker" and not campaign.measuring.is_tracked:
         frame = "a frame that is fitted in each session"
     fitted_poses = format_count(_count_poses(training), "pose")
     validation_poses = format_count(_count_poses(held_out), "validation pose")

@@ -40,6 +40,7 @@ class Board(Pose):
 
     name = "board"
     meaning = "pose of a board in the camera's optical frame"
+    error = "position error as the camera measures it"
 
     is_converted = True
     sensor = Sensor(

@@ -80,6 +80,11 @@ class MeasuringPlan:
         return {kind.name for kind in self.kinds} <= {"position", "pose"}
 
     @property
+    def error(self) -> str:
+        """What the length of a residual is, in words."""
+        return " or ".join(dict.fromkeys(kind.error for kind in self.kinds))
+
+    @property
     def states_places(self) -> bool:
         """Whether any row says where the target is in the frame of the session."""
         return any(kind.reads_poses for kind in self.kinds) or any(

@@ -30,6 +30,7 @@ class Distance(Kind):
 
     name = "distance"
     meaning = "distance of the target from an anchor: a ball bar or a draw wire"
+    error = "error of the distance"
     numbers = 1
     columns = ("value",)
     keys: ClassVar = {

@@ -27,6 +27,7 @@ class Line(Plane):
 
     name = "line"
     meaning = "coordinate of the target along an unknown axis: a dial gauge"
+    error = "error of the reading"
     touches = False
     direction_key = "axis"
     keys: ClassVar = {

@@ -31,6 +31,7 @@ class Plane(Kind):
 
     name = "plane"
     meaning = "height of the target over an unknown plane, 0 where it touches"
+    error = "distance from the plane"
     numbers = 1
     columns = ("value",)
     touches = True

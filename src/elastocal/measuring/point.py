@@ -29,6 +29,7 @@ class Point(Kind):
     name = "point"
     holds_target = True
     meaning = "the target is in a place: a ball in a socket, a tip in a cone"
+    error = "distance from the touched place"
     numbers = 3
     keys: ClassVar = {
         "position_m": "[x, y, z] in the frame of the session, or unknown",

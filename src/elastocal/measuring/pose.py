@@ -20,6 +20,7 @@ class Pose(Kind):
 
     name = "pose"
     meaning = "position and orientation of the target in the frame of the session"
+    error = "position error"
     numbers = 6
     columns = ("x", "y", "z", "rx", "ry", "rz")
     sensor = Sensor(

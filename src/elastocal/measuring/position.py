@@ -21,6 +21,7 @@ class Position(Kind):
 
     name = "position"
     meaning = "position of the target in the frame of the session"
+    error = "position error"
     numbers = 3
     columns = ("x", "y", "z")
     sensor = Sensor(

@@ -122,6 +122,7 @@ class Kind:
     ----------
     name : value of ``measured`` and ``kind`` in campaign.yaml and measurements.csv.
     meaning : one line, what a row measures.
+    error : noun for the length of a residual, as headlines and reports state it.
     numbers : numbers in a row: 1, 3 or 6. Several numbers are components of a vector
         in the axes of the session, m, followed by those of a rotation, rad.
     columns : columns that the user writes for a row.
@@ -141,6 +142,7 @@ class Kind:
 
     name: str
     meaning: str
+    error: str = "residual"
     numbers: int
     columns: Sequence[str] = ()
     is_converted: bool = False

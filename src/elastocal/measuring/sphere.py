@@ -37,6 +37,7 @@ class Sphere(Kind):
 
     name = "sphere"
     meaning = "height of the target over an unknown sphere, 0 where it touches"
+    error = "distance from the sphere"
     numbers = 1
     columns = ("value",)
     touches = True
