@@ -16,6 +16,7 @@ from scipy.constants import g, pound_force
 
 from elastocal.campaigns.campaign import group_equal_rows
 from elastocal.counting import format_digits
+from elastocal.data_checks.contact_faults import find_contact_faults
 from elastocal.data_checks.hypotheses import find_better_interpretation
 from elastocal.data_checks.placement import (
     IMPLAUSIBLE_M,
@@ -139,11 +140,12 @@ LOAD_UNITS = (
 def find_faults(campaign: Campaign) -> tuple[Fault, ...]:
     """Find the faults that the measurements of a campaign show.
 
-    A check is skipped if a fault that was already found makes it meaningless. All but
-    the first compare positions, which campaigns with features do not have.
+    A check is skipped if a fault that was already found makes it meaningless. Campaigns
+    with features have no positions that could be compared; they have checks of their
+    own.
     """
     if campaign.measuring.channels:
-        return tuple(find_swapped_places(campaign))
+        return tuple(find_swapped_places(campaign) or find_contact_faults(campaign))
     for find in (find_constant_columns, find_better_interpretation):
         faults = find(campaign)
         if faults:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import permutations, product
+from itertools import combinations, permutations, product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -219,7 +219,7 @@ def _compare_misfits(
 
 def list_discrete_hypotheses(campaign: Campaign) -> list[Hypothesis]:
     """List all hypotheses without fitted values, the simplest first."""
-    hypotheses = [*_list_senses(campaign.robot.commands), *_list_lengths(campaign)]
+    hypotheses = [*list_senses(campaign.robot.commands), *_list_lengths(campaign)]
     if campaign.measures_poses:
         return [
             *hypotheses,
@@ -408,7 +408,32 @@ def list_row_shifts(campaign: Campaign) -> list[Hypothesis]:
     return hypotheses
 
 
-def _list_senses(joints: int) -> Iterator[Hypothesis]:
+def list_exchanged_joints(joints: int) -> Iterator[Hypothesis]:
+    """List pairs of joints whose columns are exchanged: another program counts or sorts
+    the joints differently."""
+    for first, second in combinations(range(joints), 2):
+        order = np.arange(joints)
+        order[[first, second]] = second, first
+        detail = (
+            f"the angles of joints {first + 1} and {second + 1} are exchanged:"
+            " measurements fit with the columns the other way round"
+        )
+        read = partial(_multiply_angles, np.eye(joints)[order])
+        yield Hypothesis("exchanged_joints", detail, read, (first + 1, second + 1))
+
+
+def list_units_of_values() -> Iterator[Hypothesis]:
+    """List units of lengths in which the column ``value`` may be written."""
+    for unit, metres in _LENGTHS.items():
+        detail = (
+            f"the column value looks like {unit}: measurements fit {metres:g} times the"
+            " written numbers"
+        )
+        read = transform_columns(position=partial(np.multiply, metres))
+        yield Hypothesis("wrong_unit", detail, read)
+
+
+def list_senses(joints: int) -> Iterator[Hypothesis]:
     """Joints that are counted in the other sense, then joints that are counted from their
     neighbours."""
     identity = np.eye(joints)

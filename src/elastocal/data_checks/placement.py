@@ -100,10 +100,10 @@ class Placement:
         for number in np.unique(target):
             members = target == number
             distances = self.distance[members]
-            misfit[0] = max(misfit[0], _trimmed_rms(distances))
+            misfit[0] = max(misfit[0], compute_trimmed_rms(distances))
             if self.rotation_angle is not None:
                 angles = self.rotation_angle[members]
-                misfit[1] = max(misfit[1], _trimmed_rms(angles))
+                misfit[1] = max(misfit[1], compute_trimmed_rms(angles))
         return misfit
 
 
@@ -174,7 +174,8 @@ def root_mean_square(values: np.ndarray) -> float:
     return float(np.sqrt((values**2).mean()))
 
 
-def _trimmed_rms(distance: np.ndarray) -> float:
+def compute_trimmed_rms(distance: np.ndarray) -> float:
+    """Root mean square of distances without the largest ones."""
     count = max(int((1 - _TRIMMED_SHARE) * len(distance)), 1)
     return root_mean_square(np.sort(distance)[:count])
 
