@@ -465,6 +465,23 @@ def test_a_camera_before_a_board_has_no_fault_and_small_scales_are_left_to_physi
     assert find_better_interpretation(scaled) == []
 
 
+@pytest.mark.parametrize("is_link", [True, False], ids=["rotations", "positions"])
+def test_positions_in_other_axes_of_the_camera_than_rotations_are_named(
+    before_a_board, is_link
+):
+    columns = before_a_board.measurements
+    link = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+    axes = link if is_link else link.T
+    # The measurements are poses of the camera in the board.
+    camera = Rotation.from_rotvec(columns.rotation_vector)
+    board_in_camera = camera.inv().apply(columns.position)
+    position = camera.apply(board_in_camera @ axes.T)
+    mixed = replace_measured_columns(before_a_board, position=position)
+    (fault,) = find_better_interpretation(mixed)
+    assert fault.name == "swapped_axes"
+    assert "positions and rotations of the board have different axes" in fault.detail
+
+
 def test_the_link_frame_of_a_camera_is_told_from_its_optical_frame(before_a_board):
     estimate = place_measurements(before_a_board).estimate
     mount = Rotation.from_matrix(estimate.target_rotation[0]).as_rotvec()

@@ -1,7 +1,11 @@
 """Frames that are declared wrongly by millimetres are found where they are, and none on
 a robot with inexact geometry."""
 
+import re
+import shutil
+
 import numpy as np
+import pandas as pd
 import pytest
 from analysed_robots import ROBOTS, analysed
 from made_folders import make_folder
@@ -125,6 +129,19 @@ def test_a_misplaced_base_or_target_is_reported_before_any_diagnosis(tmp_path, n
     sentences = inspect_campaign(tool, ROBOTS).attention
     assert "along x of" in sentences[0]
     assert not any("base stands" in sentence for sentence in sentences)
+
+
+def test_squares_that_are_too_small_are_a_possible_cause_of_a_wrong_length(tmp_path):
+    folder = tmp_path / "scaled_board"
+    shutil.copytree(ROBOTS.parents[1] / "data/measured/fr3_board", folder)
+    document = (folder / "campaign.yaml").read_text()
+    document = re.sub("campaign: .*", "campaign: scaled_board", document)
+    (folder / "campaign.yaml").write_text(document)
+    table = pd.read_csv(folder / "measurements.csv", comment="#")
+    table[["x", "y", "z"]] *= 1.08
+    table.to_csv(folder / "measurements.csv", index=False)
+    frames = find_in(folder)
+    assert any("a board or a distance of another size" in f.sentence for f in frames)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -30,6 +30,7 @@ from elastocal.data_checks.placement import (
     select_spread_poses,
 )
 from elastocal.data_checks.protocol import Fault, Value
+from elastocal.measuring.board import ON_ROBOT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -225,6 +226,7 @@ def list_discrete_hypotheses(campaign: Campaign) -> list[Hypothesis]:
             *hypotheses,
             *_list_rotations(),
             _INVERTED,
+            *_list_camera_axes(campaign),
             *_list_exchanged_axes(with_rotations=True),
         ]
     if campaign.frame != "tracker":
@@ -492,6 +494,36 @@ def _list_rotations() -> Iterator[Hypothesis]:
         detail = f"the columns of the rotation vector look like {description}, in rad"
         read = transform_columns(rotation_vector=partial(_from_angles, letters))
         yield Hypothesis("wrong_unit", detail, read)
+
+
+def _list_camera_axes(campaign: Campaign) -> Iterator[Hypothesis]:
+    """Positions of a board in other axes of the camera than its rotations.
+
+    If both are in the same axes, the unknown mount of the camera takes up which. A
+    camera beside the robot needs no hypothesis of its own, because its axes are those
+    of the session.
+    """
+    if campaign.measuring.camera != ON_ROBOT:
+        return
+    detail = (
+        "positions and rotations of the board have different axes: one of them is in the"
+        " camera's optical frame (z forward, x right), the other in its link frame"
+        " (x forward, z up)"
+    )
+    for axes in _CAMERA_AXES:
+        yield Hypothesis("swapped_axes", detail, partial(_turn_in_camera, axes))
+
+
+def _turn_in_camera(axes: np.ndarray, campaign: Campaign) -> Campaign:
+    """Turn the positions of a board in the camera; the measurements are poses of the
+    camera in the board."""
+    measurements = campaign.measurements
+    if measurements.rotation_vector is None:
+        return campaign
+    camera = Rotation.from_rotvec(measurements.rotation_vector)
+    board_in_camera = camera.inv().apply(measurements.position)
+    position = camera.apply(board_in_camera @ axes.T)
+    return replace(campaign, measurements=replace(measurements, position=position))
 
 
 def _list_exchanged_axes(*, with_rotations: bool) -> Iterator[Hypothesis]:

@@ -362,6 +362,9 @@ def _describe_frame(
             f"{frame} ends {length} from where the robot file has it, {direction} of its far end: "
             "a wrong length, or another variant of the robot"
         )
+        if not campaign.measuring.is_tracked:
+            # Lengths of the instrument bend the robot as its own lengths do.
+            text += ", or a board or a distance of another size than stated"
         if frame == "link 1":
             text += ", or a wrong height of base or pedestal"
     if alternatives:

@@ -153,7 +153,8 @@ def inspect_case(whole: Case, held_out: Measurements) -> Overview:
         *_describe_untestable(untestable),
     ]
     attention = [fault.detail for fault in data_faults]
-    if not case.campaign.measuring.is_tracked:
+    # With data at fault, the fit says nothing of the robot.
+    if not data_faults and not case.campaign.measuring.is_tracked:
         rows += _describe_tip(declared, case)
         attention += describe_unseen_errors(
             find_unseen_errors(declared, case.observations)
