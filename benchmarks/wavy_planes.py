@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 from common import ROBOTS
-from instruments import MIDDLE_RAD, NORMALS, ROBOT, open_workshop
+from instruments import ARM, MIDDLE_RAD, NORMALS, open_workshop
 
 from elastocal.application.identifiability import predict_tip_error
 from elastocal.campaigns.campaign import GEOMETRY, tabulate_measurements
@@ -135,7 +135,7 @@ def write_folder(
     """Write a campaign of the tip."""
     whole = {
         "campaign": folder.name,
-        "robot": ROBOT,
+        "robot": ARM,
         "targets": {"tip": {"point": "6DoF", "offset_m": "unknown"}},
         "declared": [] if document["measured"] == "position" else [*GEOMETRY],
         "compliance": "nominal",
