@@ -244,6 +244,8 @@ def test_a_plan_of_a_camera_is_a_sheet_for_poses_of_the_board(elastocal, tmp_pat
     sheet = pd.read_csv(folder / "measurements.csv")
     assert "feature" not in sheet and sheet[["x", "rz"]].isna().all(axis=None)
     assert not sheet["q1"].isna().any()
+    next_step = " ".join(result.output.partition("next: ")[2].split())
+    assert "elastocal import board boards.csv --joints" in next_step
     # A board that is seen where the robot puts it has a campaign that can be checked.
     filled = sheet.assign(**see_board(sheet, np.array([0.5, 0.0, 0.02])), done="x")
     filled.to_csv(folder / "measurements.csv", index=False)

@@ -44,6 +44,18 @@ def test_named_columns_may_stand_in_any_order(tmp_path):
     np.testing.assert_allclose(read_joint_angles(path, NAMED, "rad").angles, ANGLES)
 
 
+def test_the_sheet_of_a_plan_gives_joint_angles_in_rad(tmp_path):
+    path = tmp_path / "measurements.csv"
+    degrees = [f"q{joint}_deg" for joint in range(1, 8)]
+    plain = [f"q{joint}" for joint in range(1, 8)]
+    # The sheet shows rounded degrees; the angles in rad are exact.
+    shown = np.degrees(ANGLES).round(1)
+    header = ",".join([*degrees, *plain])
+    cells = np.hstack([shown, ANGLES])
+    np.savetxt(path, cells, delimiter=",", header=header, comments="")
+    np.testing.assert_allclose(read_joint_angles(path, ROBOT).angles, ANGLES)
+
+
 def test_the_joint_without_a_column_is_named(tmp_path):
     path = tmp_path / "joints.csv"
     header = ",".join(NAMES[:-1])

@@ -242,7 +242,18 @@ def _describe_next(setup: SetUp | None, folder: Path) -> str:
     if setup is None:
         table = format_command("import", "csv", "tracker.csv", "--folder", folder)
         return f"measure, then {table}"
-    filled = f"fill in {folder / 'measurements.csv'}"
+    sheet = folder / "measurements.csv"
+    if setup.kind.is_converted:
+        table = format_command(
+            "import",
+            "board",
+            "boards.csv",
+            *("--joints", sheet),
+            *("--folder", folder.with_name(f"{folder.name}_measured")),
+            *("--robot", folder / "robot.yaml"),
+        )
+        return f"take an image for each row, in their order, elastocal detect, then {table}"
+    filled = f"fill in {sheet}"
     if setup.kind.is_contact:
         filled += " with the joint angles of each contact"
     return f"measure, {filled}, then {format_command('check', folder)}"

@@ -70,14 +70,18 @@ def read_joint_angles(
         return is_named or bool(find_joints(name for name in names if name))
 
     text = read_text_table(path, is_header, wanted=_HEADER, units_in=read_units)
-    columns, stated_units = find_columns(text, {}, robot)
     wanted = list_joint_columns(robot.commands)
+    # The sheet of a plan has each angle twice: in degrees for people, and in rad.
+    is_sheet = {*wanted, f"{wanted[0]}_deg"} <= {*text.columns}
+    named = {name: name for name in wanted} if is_sheet else {}
+    columns, stated_units = find_columns(text, named, robot)
     missing = [name for name in wanted if name not in columns]
     if missing:
         problem = f"no column {missing[0]!r}"
         if robot.command_names:
             problem += f" or {robot.command_names[wanted.index(missing[0])]!r}"
         raise InputError(path, "header", problem, _HEADER)
+    unit = "rad" if is_sheet else unit
     options = {"angles": unit} if unit else {}
     units = find_units(text, columns, wanted, stated_units, options, robot)
     angles = text.cells(columns, find_scales(units)).matrix(wanted)
