@@ -29,6 +29,7 @@ from elastocal.data_checks.faults import (
 from elastocal.fitting.least_squares import fit_model
 from elastocal.fitting.model import build_declared_model
 from elastocal.fitting.observations import average_repeats
+from elastocal.mechanics.robot import Mass
 
 PLANS = {
     "base": Plan(poses=10, loads=2),
@@ -217,15 +218,17 @@ def test_loads_turned_round_are_seen_by_compliances_below_zero_and_joints_withou
         all(f"joint {joint} below 0 " in warning for joint in range(1, 7))
         and "usual for such a robot" in warning
     )
-    rigid = replace(
-        make_campaign(replace(fanuc, compliance_known=False), 1), compliance="nominal"
-    )
-    (warning,) = warn_of_compliances(
-        fit_model(
-            build_declared_model(rigid), average_repeats(rigid.measurements), NOISE
+    heavy = Mass(3, 40.0, (0.1, 0.0, 0.0), 0.1)
+    for masses, count in (((heavy,), 1), ((), 0)):
+        robot = replace(fanuc, compliance_known=False, masses=masses)
+        rigid = replace(make_campaign(robot, 1), compliance="nominal")
+        warnings = warn_of_compliances(
+            fit_model(
+                build_declared_model(rigid), average_repeats(rigid.measurements), NOISE
+            )
         )
-    )
-    assert "taken as rigid" in warning
+        assert len(warnings) == count
+        assert all("taken as rigid" in warning for warning in warnings)
 
 
 @pytest.mark.parametrize("tracker", [True, False])

@@ -405,12 +405,14 @@ def warn_of_compliances(fitted: Fit) -> list[str]:
     """Warn of identified joint compliances that are negative or far from their reference.
 
     There is no warning if measurements are wrong by centimetres, because compliances
-    mean nothing then. If compliances are neither identified nor known, the warning says
-    that the joints are taken as rigid.
+    mean nothing then. If compliances are neither identified nor known, and weights are
+    declared, the warning says that the joints are taken as rigid.
     """
     model = fitted.model
     if not model.identifies_compliance:
-        return [] if model.compliance_known else [_RIGID]
+        # Loads would need compliances, so declared weights are the only load here.
+        is_rigid = not model.compliance_known and model.sites.masses
+        return [_RIGID] if is_rigid else []
     distances = np.linalg.norm(fitted.residual[:, :3], axis=1)
     if root_mean_square(distances) > IMPLAUSIBLE_M:
         return []
