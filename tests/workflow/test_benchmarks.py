@@ -56,6 +56,13 @@ def test_the_cost_of_a_finished_run_is_stated(small_study, tmp_path):
     assert float(cost[1]) > 0 and "from 12 and 24 data sets, 1 cases" in said
 
 
+def test_the_rates_of_slipping_stands_are_stated():
+    printed = ended("pushed_stands.py", 2, 9200)
+    # The first robot has a stand that does not move, the second one that slips.
+    assert "still: slipping stand stated: 0 of 1" in printed
+    assert "slips: slipping stand stated: 1 of 1" in printed
+
+
 def test_the_rates_of_an_instrument_are_stated_with_their_intervals():
     printed = ended("instruments.py", 2, 1, "plane")
     # One robot without an effect, which is right, and one with an effect.
