@@ -239,6 +239,11 @@ INSTRUMENTS = {
 def write_case(folder, kind, workshop):
     """Measure a robot by a kind and write the campaign."""
     measured = INSTRUMENTS[kind](workshop)
+    write_measured(folder, kind.partition("_")[0], measured)
+
+
+def write_measured(folder, kind, measured):
+    """Write the campaign of rows that were measured by a kind."""
     count = len(measured.angles)
     table = {
         "pose": np.arange(count),
@@ -250,7 +255,7 @@ def write_case(folder, kind, workshop):
     document = {
         "campaign": "instruments",
         "robot": ARM,
-        "measured": kind.partition("_")[0],
+        "measured": kind,
         "compliance": "nominal",
         "declared": ["joint_offset", "link_geometry"],
         "holdout": {"fraction": 0.25, "seed": 1},
