@@ -1,7 +1,11 @@
 """The statement of a diagnosis agrees with the fits that it describes."""
 
-import numpy as np
+from dataclasses import replace
 
+import numpy as np
+from made_loop_tables import CAMPAIGNS
+
+from elastocal.diagnosis.training_verdict import warn_of_more_probable_causes
 from elastocal.fitting.model import get_joint_compliances
 
 
@@ -19,3 +23,13 @@ def test_compliances_before_are_those_of_the_declared_model(diagnosis):
 def test_each_warning_is_stated_once(diagnosis):
     warnings = diagnosis.document["warnings"]
     assert len(warnings) == len(set(warnings))
+
+
+def test_a_cause_that_is_more_probable_than_the_stated_one_is_mentioned():
+    (effect,) = CAMPAIGNS["named"].effects
+    stated = replace(effect, name="bearing_runout", probability=0.27)
+    mechanisms = {"bearing_runout": 0.27, "link_weight": 0.8, "other": 0.9}
+    (warning,) = warn_of_more_probable_causes([stated], mechanisms)
+    assert "gravity sag (80 %) is more probable than bearing runout (27 %)" in warning
+    sure = replace(stated, probability=0.85)
+    assert warn_of_more_probable_causes([sure], mechanisms) == []

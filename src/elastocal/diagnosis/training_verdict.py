@@ -29,6 +29,7 @@ from elastocal.diagnosis.verdict import (
     list_locations,
     warn_of_excess_scatter,
 )
+from elastocal.effects.catalogue import list_effects
 from elastocal.fitting.model import get_joint_compliances
 from elastocal.fitting.sensor_noise import compute_target_std_m
 from elastocal.validation.held_out import compute_scatter
@@ -45,7 +46,7 @@ from elastocal.verdict import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from elastocal.data_checks.protocol import Fault
     from elastocal.diagnosis.diagnose import Step
@@ -204,7 +205,10 @@ def _state_evidence(
         ),
         candidates_tested=len(tested),
         untestable=design.untestable,
-        warnings=_warn_of_search(evidence, result.full_model, effects, settings),
+        warnings=(
+            *warn_of_more_probable_causes(effects, evidence.conclusion.mechanisms),
+            *_warn_of_search(evidence, result.full_model, effects, settings),
+        ),
     )
 
 
@@ -227,6 +231,44 @@ def _state_widened_effects(
         evidence.design.problem, evidence.named_model, average, poses
     )
     return state_effects(evidence, result.full_model, widened, observations)
+
+
+def warn_of_more_probable_causes(
+    effects: Sequence[Effect], mechanisms: Mapping[str, float]
+) -> list[str]:
+    """Warn of a mechanism that is more probable than a stated one, but not stated.
+
+    The evidence as it is chooses the model; probabilities allow for laws that are only
+    nearly true, and can order the mechanisms differently.
+
+    Parameters
+    ----------
+    effects : stated effects.
+    mechanisms : probability that a mechanism acts, by its name.
+    """
+    known_effects = list_effects()
+    stated = {effect.name for effect in effects}
+    others = {
+        name: probability
+        for name, probability in mechanisms.items()
+        if name in known_effects and name not in stated
+    }
+    if not others:
+        return []
+    best = max(others, key=lambda name: others[name])
+    less_probable = [
+        f"{known_effects[effect.name].words} ({100 * effect.probability:.0f} %)"
+        for effect in effects
+        if effect.name in known_effects and effect.probability < others[best]
+    ]
+    if not less_probable:
+        return []
+    verb = "is" if len(less_probable) == 1 else "are"
+    return [
+        f"{known_effects[best].words} ({100 * others[best]:.0f} %) is more probable than"
+        f" {' and '.join(less_probable)}, which {verb} in the model: these measurements"
+        " do not decide between them"
+    ]
 
 
 def _warn_of_search(
