@@ -86,3 +86,15 @@ def test_touches_of_planes_show_exchanged_joints(tmp_path):
         row["angles"] = EXCHANGED @ row["angles"]
     (fault,) = find_faults_of(tmp_path / "wrong", document, rows)
     assert fault.joints == (1, 2)
+
+
+def test_touches_of_another_plane_than_the_named_one_are_found(tmp_path):
+    rows, features = touch_crossing_planes(open_workshop(5), 30, 5e-5)
+    for row in rows[20:28]:
+        row["feature"] = "plane1"
+    document = {"measured": "plane", "features": features}
+    (fault,) = find_faults_of(tmp_path / "swapped", document, rows)
+    assert fault.name == "swapped_places"
+    assert "of plane1 in session 0" in fault.detail and "fit plane0" in fault.detail
+    before_m, after_m = fault.evidence
+    assert after_m < 0.01 < before_m

@@ -7,10 +7,12 @@ here, and the remaining misfit is compared with that of other interpretations of
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.campaigns.campaign import group_equal_rows
 from elastocal.data_checks.hypotheses import (
     list_exchanged_joints,
     list_senses,
@@ -22,14 +24,22 @@ from elastocal.data_checks.placement import (
     compute_trimmed_rms,
 )
 from elastocal.data_checks.protocol import Fault, Value
+from elastocal.data_checks.swapped_places import PlaceComparison, report_swapped
 from elastocal.fitting.least_squares import fit_model
-from elastocal.fitting.model import build_declared_model, build_nominal_model
+from elastocal.fitting.model import (
+    build_declared_model,
+    build_nominal_model,
+    evaluate_conditions,
+    predict,
+    predict_channels,
+)
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import separate_measurements
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign
     from elastocal.data_checks.hypotheses import Hypothesis
+    from elastocal.fitting.least_squares import Fit
 
 # Errors of a nominal robot, m and rad, as the standard deviation of its measurements.
 _NOMINAL_ERROR = 0.01
@@ -75,12 +85,74 @@ def _list_hypotheses(campaign: Campaign) -> list[Hypothesis]:
     return hypotheses
 
 
+def find_swapped_features(campaign: Campaign) -> list[Fault]:
+    """Find a feature whose measurements often fit another one of its kind.
+
+    Sockets alone have a sharper test, see `swapped_places`. Returns at most one fault.
+    """
+    # Components of one measurement would be compared one by one.
+    channels = campaign.measuring.channels
+    if any(channel.component is not None for channel in channels):
+        return []
+    return report_swapped(_compare_features(campaign), campaign)
+
+
+def _compare_features(campaign: Campaign) -> PlaceComparison:
+    """Compare each measurement with its feature and the others of its kind that the
+    nominal robot may touch."""
+    measurements = campaign.measurements
+    channels = campaign.measuring.channels
+    assert measurements.channel is not None
+    keys = np.column_stack([measurements.session, measurements.channel])
+    first, place_index = group_equal_rows(keys)
+    session, channel = keys[first].T
+    distance = _compute_distances(campaign)[:, channel]
+    kinds = np.array([channels[number].kind.name for number in channel])
+    is_alternative = session == session[place_index][:, None]
+    is_alternative &= kinds == kinds[place_index][:, None]
+    is_alternative &= distance < IMPLAUSIBLE_M
+    rows = np.arange(len(measurements))
+    is_alternative[rows, place_index] = False
+    others = np.where(is_alternative, distance, np.inf)
+    # A channel without a feature has no other of its kind, and is never reported.
+    features = np.array([channels[number].feature or 0 for number in channel])
+    return PlaceComparison(
+        place_index=place_index,
+        places=np.column_stack([session, features]),
+        from_named=distance[rows, place_index],
+        from_nearest=others.min(axis=1),
+        nearest=others.argmin(axis=1),
+    )
+
+
+def _compute_distances(campaign: Campaign) -> np.ndarray:
+    """Distance of N measurements from the feature of each of C channels with the nominal
+    robot, (N, C) array, m."""
+    fitted = _fit_nominal(campaign)
+    model, estimate = fitted.model, fitted.estimate
+    observations = separate_measurements(campaign.measurements)
+    conditions = evaluate_conditions(model, estimate, observations.states)
+    poses = predict(model, estimate, observations, conditions)
+    distances = []
+    for number in range(len(campaign.measuring.channels)):
+        channel = np.full(len(observations), number)
+        moved = replace(observations, channel=channel)
+        residual = predict_channels(model, estimate, moved, *poses).residual
+        distances.append(np.linalg.norm(residual[:, :3], axis=1))
+    return np.stack(distances, axis=1)
+
+
 def _compute_misfit(campaign: Campaign) -> float:
     """Residual of the nominal robot, m, a trimmed RMS: a few wrong rows are no fault of
     all."""
+    residual = _fit_nominal(campaign).residual
+    return compute_trimmed_rms(np.linalg.norm(residual[:, :3], axis=1))
+
+
+def _fit_nominal(campaign: Campaign) -> Fit:
+    """Fit frames, targets and features to the nominal robot; wrong rows lose weight."""
     noise = Noise(
         "declared", _NOMINAL_ERROR, _NOMINAL_ERROR, np.zeros(campaign.robot.joints)
     )
     model = build_nominal_model(build_declared_model(campaign))
-    fitted = fit_model(model, separate_measurements(campaign.measurements), noise)
-    return compute_trimmed_rms(np.linalg.norm(fitted.residual[:, :3], axis=1))
+    return fit_model(model, separate_measurements(campaign.measurements), noise)

@@ -70,21 +70,25 @@ def find_swapped_places(campaign: Campaign) -> list[Fault]:
     )
     if not channels or not is_point:
         return []
-    touches = _locate_touches(campaign)
-    comparison = _compare_places(touches)
+    return report_swapped(_compare_places(_locate_touches(campaign)), campaign)
+
+
+def report_swapped(comparison: PlaceComparison, campaign: Campaign) -> list[Fault]:
+    """Report the place with the most measurements that fit another place, if there are
+    enough of them."""
     is_swapped = comparison.find_swapped()
-    sizes = np.bincount(touches.place_index)
-    counts = np.bincount(touches.place_index[is_swapped], minlength=len(sizes))
+    sizes = np.bincount(comparison.place_index)
+    counts = np.bincount(comparison.place_index[is_swapped], minlength=len(sizes))
     worst = int(np.argmax(counts))
     if counts[worst] < max(_FEWEST_ROWS, _SMALLEST_SHARE * sizes[worst]):
         return []
-    rows = is_swapped & (touches.place_index == worst)
+    rows = is_swapped & (comparison.place_index == worst)
     fitting = int(np.bincount(comparison.nearest[rows]).argmax())
     names = [
-        campaign.measuring.features[touches.places[place_index, 1]].name
+        campaign.measuring.features[comparison.places[place_index, 1]].name
         for place_index in (worst, fitting)
     ]
-    session = int(touches.places[worst, 0])
+    session = int(comparison.places[worst, 0])
     detail = _describe(names, session, campaign.measurements.row[rows])
     value = Value("measurements", float(counts[worst]), "–")
     evidence = (
@@ -95,17 +99,21 @@ def find_swapped_places(campaign: Campaign) -> list[Fault]:
 
 
 @dataclass(frozen=True)
-class _Comparison:
-    """Distances of N measurements from places.
+class PlaceComparison:
+    """Distances of N measurements from G places.
 
     Attributes
     ----------
+    place_index : (N,) int array, the place that the row names.
+    places : (G, 2) int array, session and feature of each place.
     from_named : (N,) array, distance from the place that the row names, m.
     from_nearest : (N,) array, distance from the nearest other place of the same session,
         m; infinite if there is none.
     nearest : (N,) int array, index of this other place.
     """
 
+    place_index: np.ndarray
+    places: np.ndarray
     from_named: np.ndarray
     from_nearest: np.ndarray
     nearest: np.ndarray
@@ -116,7 +124,7 @@ class _Comparison:
         return (self.from_named > IMPLAUSIBLE_M) & is_closer
 
 
-def _compare_places(touches: _Touches) -> _Comparison:
+def _compare_places(touches: _Touches) -> PlaceComparison:
     """Compare each measurement with the place that it names and with the others."""
     places, position = _fit_places(touches)
     distance = np.linalg.norm(position[:, None] - places, axis=2)
@@ -125,7 +133,9 @@ def _compare_places(touches: _Touches) -> _Comparison:
     is_alternative = session[touches.place_index][:, None] == session
     is_alternative[rows, touches.place_index] = False
     alternatives = np.where(is_alternative, distance, np.inf)
-    return _Comparison(
+    return PlaceComparison(
+        place_index=touches.place_index,
+        places=touches.places,
         from_named=distance[rows, touches.place_index],
         from_nearest=alternatives.min(axis=1),
         nearest=alternatives.argmin(axis=1),
