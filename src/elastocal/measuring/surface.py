@@ -17,7 +17,7 @@ References
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -32,9 +32,6 @@ from elastocal.measuring.protocol import (
     refuse_key,
     span_plane,
 )
-
-if TYPE_CHECKING:
-    pass
 
 # Form of an ordinary table top or a wall: some tenths of a millimetre.
 _FORM_STD_M = 3e-4
@@ -51,7 +48,11 @@ _MARGIN = 1.4
 _WAVES = 12
 # Half the width of the square of a feature that is touched at one point, m.
 _SMALLEST_M = 1e-3
+# Where the values of a feature are, see `Surface`.
 _NORMAL = slice(0, 4)
+_MIDDLE = slice(4, 7)
+_AXES = slice(7, 13)
+_HALF_WIDTH = 13
 _WAVES_FROM = 14
 
 
@@ -189,9 +190,9 @@ def _lay_square(
 
 def _evaluate_waves(position: np.ndarray, values: np.ndarray) -> _Form:
     """Evaluate the waves of a surface at positions (M, 3), m."""
-    middle = values[4:7]
-    axes = values[7:13].reshape(2, 3)
-    half_width = values[13]
+    middle = values[_MIDDLE]
+    axes = values[_AXES].reshape(2, 3)
+    half_width = values[_HALF_WIDTH]
     frequency = 0.5 * np.pi * _WAVE_NUMBERS / half_width
     along = (position - middle) @ axes.T + half_width
     phase = along[:, None] * frequency
