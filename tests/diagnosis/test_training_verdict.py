@@ -28,8 +28,10 @@ def test_each_warning_is_stated_once(diagnosis):
 def test_a_cause_that_is_more_probable_than_the_stated_one_is_mentioned():
     (effect,) = CAMPAIGNS["named"].effects
     stated = replace(effect, name="bearing_runout", probability=0.27)
-    mechanisms = {"bearing_runout": 0.27, "link_weight": 0.8, "other": 0.9}
+    mechanisms = {"bearing_runout": 0.27, "link_weight": 0.8, "other": 0.1}
     (warning,) = warn_of_more_probable_causes([stated], mechanisms)
     assert "gravity sag (80 %) is more probable than bearing runout (27 %)" in warning
+    (warning,) = warn_of_more_probable_causes([stated], mechanisms | {"other": 0.9})
+    assert warning.startswith("a related mechanism (90 %) is more probable")
     sure = replace(stated, probability=0.85)
     assert warn_of_more_probable_causes([sure], mechanisms) == []

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from elastocal.effects.protocol import Candidate
 
 OTHER = "other"
+# Its name beside a mechanism of the catalogue.
+RELATED = "a related mechanism"
 # Mechanism of the terms of single rows or poses that are wrong (see `contamination`).
 GROSS_ERROR = "gross error"
 # Mechanism of their competitors that act at one end of a variable of the state (see

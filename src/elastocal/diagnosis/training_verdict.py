@@ -16,6 +16,7 @@ from elastocal.diagnosis.effect_estimates import (
     warn_of_implausible_values,
 )
 from elastocal.diagnosis.gross_errors import format_gross_error_warnings
+from elastocal.diagnosis.hypotheses import OTHER, RELATED
 from elastocal.diagnosis.model_averaging import (
     ModelAverage,
     allow_for_laws,
@@ -246,26 +247,27 @@ def warn_of_more_probable_causes(
     effects : stated effects.
     mechanisms : probability that a mechanism acts, by its name.
     """
-    known_effects = list_effects()
+    words = {name: effect.words for name, effect in list_effects().items()}
+    words[OTHER] = RELATED
     stated = {effect.name for effect in effects}
     others = {
         name: probability
         for name, probability in mechanisms.items()
-        if name in known_effects and name not in stated
+        if name in words and name not in stated
     }
     if not others:
         return []
     best = max(others, key=lambda name: others[name])
     less_probable = [
-        f"{known_effects[effect.name].words} ({100 * effect.probability:.0f} %)"
+        f"{words[effect.name]} ({100 * effect.probability:.0f} %)"
         for effect in effects
-        if effect.name in known_effects and effect.probability < others[best]
+        if effect.name in words and effect.probability < others[best]
     ]
     if not less_probable:
         return []
     verb = "is" if len(less_probable) == 1 else "are"
     return [
-        f"{known_effects[best].words} ({100 * others[best]:.0f} %) is more probable than"
+        f"{words[best]} ({100 * others[best]:.0f} %) is more probable than"
         f" {' and '.join(less_probable)}, which {verb} in the model: these measurements"
         " do not decide between them"
     ]

@@ -11,7 +11,7 @@ import numpy as np
 from elastocal import __version__
 from elastocal.application.statements import describe_left_out, tabulate_errors
 from elastocal.counting import format_integer, pluralize
-from elastocal.diagnosis.hypotheses import OTHER
+from elastocal.diagnosis.hypotheses import OTHER, RELATED
 from elastocal.effects.catalogue import list_effects
 from elastocal.effects.protocol import effect_of
 from elastocal.report import words as say
@@ -279,7 +279,7 @@ def _list_other_causes(verdict: Verdict) -> list[tuple[str, float]]:
     assert verdict.probabilities is not None
     missing = {effect.name for effect in verdict.missing_effects}
     # Together with a missing mechanism, the competitor is a related mechanism.
-    competitor = say.RELATED if missing else say.UNKNOWN
+    competitor = RELATED if missing else say.UNKNOWN
     causes = []
     for name, probability in verdict.probabilities.mechanisms.items():
         if name not in missing:

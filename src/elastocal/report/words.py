@@ -14,7 +14,7 @@ import numpy as np
 
 from elastocal import counting
 from elastocal.counting import pluralize
-from elastocal.diagnosis.hypotheses import OTHER
+from elastocal.diagnosis.hypotheses import OTHER, RELATED
 from elastocal.effects.catalogue import list_effects
 from elastocal.effects.protocol import effect_of
 
@@ -27,7 +27,6 @@ MICRO = 1e6
 MILLI = 1e3
 NOTHING = "nothing is missing"
 UNKNOWN = "something that the catalogue does not have"
-RELATED = "a related mechanism"
 # A blank without a line break.
 _TIED = "\u00a0"
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
