@@ -71,6 +71,14 @@ def test_facts_are_json_and_the_verdict_is_in_plain_words(campaign):
     assert "{{" not in said and "{%" not in said
 
 
+def test_a_mechanism_is_most_probable_only_if_no_other_one_is_more_so():
+    verdict = CAMPAIGNS["class"]
+    mechanisms = {"joint_tilt": 0.97, "other": 0.1} | verdict.probabilities.mechanisms
+    probabilities = replace(verdict.probabilities, mechanisms=mechanisms)
+    said = render_campaign_sentences(replace(verdict, probabilities=probabilities))
+    assert "one mechanism, possibly lost motion" in plainly(said["sentences"][0])
+
+
 def test_the_advice_follows_from_the_verdict_and_the_gain():
     def now(verdict, experiment=()):
         return render_campaign_sentences(verdict, experiment=experiment)["now"]
