@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,10 @@ import numpy as np
 from elastocal.errors import InputError, explain_missing_packages
 from elastocal.exchange.board_pattern import CHARUCO, BoardPattern
 from elastocal.exchange.camera_file import Camera
-from elastocal.exchange.undetected_boards import explain_undetected_board
+from elastocal.exchange.undetected_boards import (
+    SEARCHED_IMAGES,
+    explain_undetected_board,
+)
 from elastocal.mechanics.kinematics import form_cross_matrices
 
 # Columns of the table of poses, one row for each image.
@@ -122,18 +125,24 @@ def detect_boards(
     .. [1] Zhang, A flexible new technique for camera calibration, IEEE Transactions on
        Pattern Analysis and Machine Intelligence 22, 2000.
     """
-    images = [_read_image(path) for path in paths]
-    size = _find_size(paths, images, camera)
+    board = pattern.make_opencv_board()
+    size = None if camera is None else camera.size
     detected = []
     left_out = {}
-    for corners in _detect_corners(paths, images, pattern):
+    # A hundred images of a good camera fill a gigabyte, so only one is in memory.
+    for path in paths:
+        image = _read_image(path)
+        size = _check_size(path, image, size)
+        corners = ImageCorners(path.name, *find_corners(image, pattern, board))
         if len(corners.on_board) < _FEWEST_CORNERS:
             left_out[corners.image] = f"{len(corners.on_board)} corners"
         else:
             detected.append(corners)
     if not detected:
+        images = [_read_image(path) for path in paths[:SEARCHED_IMAGES]]
         raise explain_undetected_board(paths, images, pattern)
     if camera is None:
+        assert size is not None, "no image has been read"
         camera = _calibrate_camera(detected, size, paths)
     poses = []
     for corners in detected:
@@ -147,15 +156,6 @@ def detect_boards(
         allowed = "sharp images of the board that board.yaml describes"
         raise InputError(paths[0].parent, "", f"no pose ({reasons})", allowed)
     return Detection(poses, camera, left_out)
-
-
-def _detect_corners(
-    paths: Sequence[Path], images: Sequence[np.ndarray], pattern: BoardPattern
-) -> Iterator[ImageCorners]:
-    """Detect the corners of the board in each image; there may be none."""
-    board = pattern.make_opencv_board()
-    for path, image in zip(paths, images, strict=True):
-        yield ImageCorners(path.name, *find_corners(image, pattern, board))
 
 
 def estimate_pose(
@@ -279,21 +279,17 @@ def _read_image(path: Path) -> np.ndarray:
     return np.asarray(image)
 
 
-def _find_size(
-    paths: Sequence[Path], images: Sequence[np.ndarray], camera: Camera | None
+def _check_size(
+    path: Path, image: np.ndarray, wanted: tuple[int, int] | None
 ) -> tuple[int, int]:
-    """Find width and height of all images, which one camera has made."""
-    height, width = images[0].shape
-    wanted = (width, height)
-    if camera is not None and camera.size is not None:
-        wanted = camera.size
-    for path, image in zip(paths, images, strict=True):
-        size = image.shape[::-1]
-        if size != wanted:
-            pixels = f"{size[0]} x {size[1]} pixels"
-            allowed = f"{wanted[0]} x {wanted[1]}, as the camera's other images"
-            raise InputError(path, "", pixels, allowed)
-    return wanted
+    """Check that an image has the width and height that are wanted, if any, and return
+    its own: one camera has made all images."""
+    height, width = image.shape
+    if wanted is not None and wanted != (width, height):
+        pixels = f"{width} x {height} pixels"
+        allowed = f"{wanted[0]} x {wanted[1]}, as the camera's other images"
+        raise InputError(path, "", pixels, allowed)
+    return width, height
 
 
 def find_corners(

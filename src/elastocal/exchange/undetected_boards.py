@@ -17,7 +17,7 @@ from elastocal.errors import InputError
 from elastocal.exchange.board_pattern import CHARUCO, BoardPattern
 
 # Number of images that are searched again. A wrong description concerns all images.
-_MOST_IMAGES = 3
+SEARCHED_IMAGES = 3
 # Fewest markers in an image that count as seen. OpenCV sometimes takes one or two pieces
 # of a pattern for markers of another dictionary.
 _FEWEST_MARKERS = 4
@@ -39,10 +39,11 @@ def explain_undetected_board(
 
     Parameters
     ----------
-    paths, images : names and grey values of the images.
+    paths : all images.
+    images : grey values of the first ones.
     pattern : the board that was looked for.
     """
-    found, allowed = _find_reason(paths, images[:_MOST_IMAGES], pattern)
+    found, allowed = _find_reason(paths, images, pattern)
     return InputError(paths[0].parent, "", found, allowed)
 
 
