@@ -731,14 +731,13 @@ class PriorEvidence(NamedTuple):
 def find_widest_scale(model: Model, observations: Observations) -> float:
     """Find the widest prior of declared geometry, in plausible sizes.
 
-    Contacts with unknown places contain no length. A smaller robot touches all of them
-    more exactly, so their evidence always prefers larger errors of geometry. The prior is
-    then no wider than the plausible sizes. The likelihood of contacts with a single
-    number prefers no size of the robot: see `contact_density`.
+    Contacts with unknown places contain no length. A smaller robot touches sockets more
+    exactly, so their evidence prefers larger errors of geometry; the likelihood of planes
+    and spheres does not (see `contact_density`), but fits to them under a wide prior
+    converge badly. The prior is then no wider than the plausible sizes.
     """
     plan = model.measuring
-    numbers = observations.position
-    if plan is None or plan.shows_lengths(numbers) or plan.is_touch_alone(numbers):
+    if plan is None or plan.shows_lengths(observations.position):
         return float(PRIOR_SCALES[-1])
     return 1.0
 
