@@ -11,9 +11,15 @@ from contact_campaigns import (
     touch_crossing_planes,
     write_contacts,
 )
+from scipy.spatial.transform import Rotation
 
-from elastocal.fitting.features import list_feature_parameters, list_fitted_features
+from elastocal.fitting.features import (
+    find_middle,
+    list_feature_parameters,
+    list_fitted_features,
+)
 from elastocal.fitting.least_squares import register_placement
+from elastocal.fitting.model import apply_step, list_parameters
 from elastocal.fitting.observations import select_states
 from elastocal.measuring.channels import parse_measuring
 from elastocal_proof.plant.contacts import seat_in_socket, touch_plane
@@ -60,6 +66,54 @@ def test_sockets_and_a_plane_together_identify_the_joint_offsets(tmp_path):
     assert channel.any()
     white = fitted.whiten(fitted.residual)
     assert 0.8 < np.sqrt((white**2).mean()) < 1.1
+
+
+def test_sockets_have_a_middle_and_planes_have_none():
+    document = {"measured": "point", "frame": "unknown", "features": {"A": {}, "B": {}}}
+    plan = parse_measuring(document, "c")
+    places = (np.array([1.0, 0.0, 0.0]), np.array([3.0, 2.0, 0.0]))
+    np.testing.assert_array_equal(find_middle(plan, places), [2.0, 1.0, 0.0])
+    features = {"A": {"kind": "point"}, "table": {"kind": "plane"}}
+    document = {"measured": ["point", "plane"], "features": features}
+    values = (places[0], np.array([0.0, 0.0, 1.0, 0.5]))
+    assert find_middle(parse_measuring(document, "c"), values) is None
+    assert find_middle(None, ()) is None
+
+
+def hold_in_two_sockets(folder):
+    """A case of a ball in two sockets, 50 mm apart, at two places."""
+    workshop = open_workshop(3)
+    socket_m = np.array([0.0, 0.05, 0.0])
+    rows = []
+    for session, place in enumerate(spread_places(workshop, 2)):
+        for row in range(20):
+            seat = seat_in_socket(workshop, place + row % 2 * socket_m, 1e-4)
+            feature = f"socket{row % 2}"
+            rows.append({"angles": seat, "feature": feature, "session": session})
+    features = {"socket0": {}, "socket1": {}}
+    document = {"measured": "point", "frame": "unknown", "features": features}
+    return build_contact_case(write_contacts(folder, document, rows))
+
+
+def test_a_base_turns_about_the_middle_of_the_sockets(tmp_path):
+    """Two near sockets hardly determine how the base is turned about the line through
+    them. Turned about its origin, a base a metre away moves the sockets by the square of
+    the turn, and fits crept along a bent path without an end."""
+    case = hold_in_two_sockets(tmp_path / "cell")
+    start = register_placement(case.model, case.observations)
+    middle = np.mean(start.features, axis=0)
+    turn = np.array([0.1, -0.05, 0.02])
+    step = np.zeros(len(list_parameters(case.model, start)))
+    step[9:12] = turn
+    moved = apply_step(case.model, start, step)
+    in_base = start.frame_rotation[1].T @ (middle - start.frame_position[1])
+    # The linear motion of a point at the middle, without terms of second order.
+    expected = middle + start.frame_rotation[1] @ np.cross(turn, in_base)
+    reached = moved.frame_rotation[1] @ in_base + moved.frame_position[1]
+    np.testing.assert_allclose(reached, expected, atol=1e-12)
+    turned = start.frame_rotation[1] @ Rotation.from_rotvec(turn).as_matrix()
+    np.testing.assert_allclose(moved.frame_rotation[1], turned, atol=1e-12)
+    np.testing.assert_array_equal(moved.frame_position[0], start.frame_position[0])
 
 
 def test_a_feature_that_no_row_of_a_sample_touches_has_finite_values(tmp_path):

@@ -65,6 +65,25 @@ class FittedFeature:
         return [self.described[number] for number in self.numbers]
 
 
+def find_middle(
+    plan: MeasuringPlan | None, features: Sequence[np.ndarray]
+) -> np.ndarray | None:
+    """Find the point (3,) m of the session about which all targets are.
+
+    None if any feature of the plan, whose values are given, is touched in places that
+    are apart from each other.
+    """
+    if plan is None or not features:
+        return None
+    middles = []
+    for feature, values in zip(plan.features, features, strict=True):
+        middle = list_kinds()[feature.kind].find_middle(values)
+        if middle is None:
+            return None
+        middles.append(middle)
+    return np.mean(middles, axis=0)
+
+
 def list_fitted_features(plan: MeasuringPlan | None) -> list[FittedFeature]:
     """List the features of a plan that have fitted unknowns."""
     fitted: list[FittedFeature] = []

@@ -30,6 +30,7 @@ from elastocal.fitting.features import (
     FittedFeature,
     SessionPoses,
     evaluate_channels,
+    find_middle,
     get_feature_deviations,
     list_feature_parameters,
     list_fitted_features,
@@ -445,16 +446,25 @@ def apply_step(model: Model, estimate: Estimate, step: np.ndarray) -> Estimate:
 def _move_placement(
     model: Model, estimate: Estimate, components: Iterator[np.ndarray]
 ) -> Estimate:
-    """Move the frames and targets of an estimate by the next components of a step."""
+    """Move the frames and targets of an estimate by the next components of a step.
+
+    A step states the turn of a base about its origin. Sockets close to each other hardly
+    determine that turn, and far from them it bends the path of a fit. So the base turns
+    about their middle, which differs by a shift to first order.
+    """
     frame_rotation = estimate.frame_rotation.copy()
     frame_position = estimate.frame_position.copy()
     if model.has_frame_parameters:
+        middle = find_middle(model.measuring, estimate.features)
         for number in range(len(estimate.sessions)):
             shift, turn = np.split(next(components), 2)
-            frame_position[number] += frame_rotation[number] @ shift
-            frame_rotation[number] = (
-                frame_rotation[number] @ Rotation.from_rotvec(turn).as_matrix()
-            )
+            rotation = estimate.frame_rotation[number]
+            turned = Rotation.from_rotvec(turn).as_matrix()
+            if middle is not None:
+                in_base = rotation.T @ (middle - estimate.frame_position[number])
+                shift = shift + np.cross(turn, in_base) + in_base - turned @ in_base
+            frame_position[number] += rotation @ shift
+            frame_rotation[number] = rotation @ turned
     target_offset = estimate.target_offset.copy()
     target_rotation = estimate.target_rotation.copy()
     for index, fitted in model.fitted_target_components:

@@ -51,6 +51,10 @@ class Point(Kind):
         """Return the stated place."""
         return read_vector(feature, "position_m")
 
+    def find_middle(self, values: np.ndarray) -> np.ndarray:
+        """Return the place."""
+        return values
+
     def start(
         self, feature: Feature, position: np.ndarray, numbers: np.ndarray
     ) -> np.ndarray:

@@ -208,6 +208,11 @@ class Kind:
         states it."""
         return None
 
+    def find_middle(self, values: np.ndarray) -> np.ndarray | None:
+        """Return the place (3,) m in the session about which all targets of a feature
+        are, or None if they are apart from each other."""
+        return None
+
     def start(
         self, feature: Feature, position: np.ndarray, numbers: np.ndarray
     ) -> np.ndarray:
