@@ -1,4 +1,4 @@
-"""The table of docs/no_tracker.md: every arm of a finished run of `snakemake sockets
+"""The table of docs/no_tracker_results.md: every arm of a finished run of `snakemake sockets
 cameras`, and the URDFs that the authors of MUKCa calibrated, on the same held-out poses.
 
 Usage: python benchmarks/peers/mukca.py FOLDER, a clone of
