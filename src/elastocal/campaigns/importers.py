@@ -239,16 +239,23 @@ def _read_fanuc_static(path: str | Path) -> PublicMeasurements:
     return PublicMeasurements(arrays["q"], positions, {})
 
 
+def _read_motoman_poses(path: str | Path) -> np.ndarray:
+    """Read the rows (N, C) of a file, one for each pose: the file has a row for each
+    camera image, and those of one pose repeat its joint angles and its reflector."""
+    rows = scipy.io.loadmat(path)["dataset"]
+    first_of_pose = np.unique(rows[:, 0], return_index=True)[1]
+    poses: np.ndarray = rows[first_of_pose]
+    return poses
+
+
 def _read_motoman(path: str | Path) -> PublicMeasurements:
-    """Read a file with a row for each camera image of a pose; rows of one pose repeat
-    its joint angles and its reflector.
+    """Read the joint angles of the right arm and its reflector.
 
     Poses whose reflector the tracker did not see are left out. So is the 13th of the
     larger file's 587 poses, as in the source's own reader (loadNewLeicaDataset.m). The
     turntable stands still; the last digits of its encoder change.
     """
-    rows = scipy.io.loadmat(path)["dataset"]
-    rows = rows[np.unique(rows[:, 0], return_index=True)[1]]
+    rows = _read_motoman_poses(path)
     rows = rows[np.isfinite(rows[:, 19:22]).all(axis=1)]
     if len(rows) == 587:
         rows = np.delete(rows, 12, axis=0)
@@ -256,10 +263,8 @@ def _read_motoman(path: str | Path) -> PublicMeasurements:
 
 
 def _read_motoman_contacts(path: str | Path) -> PublicMeasurements:
-    """Read the joint angles (N, 12) of the left and the right arm at each contact, from
-    a file with a row for each camera image of a pose."""
-    rows = scipy.io.loadmat(path)["dataset"]
-    rows = rows[np.unique(rows[:, 0], return_index=True)[1]]
+    """Read the joint angles (N, 12) of the left and the right arm at each contact."""
+    rows = _read_motoman_poses(path)
     angles = np.concatenate([rows[:, 13:19], rows[:, 7:13]], axis=1)
     return PublicMeasurements(angles, {}, {})
 

@@ -49,13 +49,24 @@ _LARGEST_MISFIT_M = 5 * IMPLAUSIBLE_M
 
 
 def find_contact_faults(campaign: Campaign) -> list[Fault]:
+    """Find another interpretation of the whole file, or else rows that name a wrong
+    feature; at most one fault."""
+    fitted = _fit_nominal(campaign)
+    return _find_interpretation(campaign, fitted) or _find_swapped(campaign, fitted)
+
+
+def _find_interpretation(campaign: Campaign, fitted: Fit) -> list[Fault]:
     """Find the interpretation of the file with which the nominal robot fits its
-    measurements, or say that none does; at most one fault."""
-    written_m = _compute_misfit(campaign)
+    measurements, or say that none does; `fitted` is the nominal robot by the file as it
+    is written."""
+    written_m = _compute_misfit(fitted)
     if written_m < IMPLAUSIBLE_M:
         return []
     hypotheses = _list_hypotheses(campaign)
-    misfits_m = [_compute_misfit(other.apply(campaign)) for other in hypotheses]
+    misfits_m = [
+        _compute_misfit(_fit_nominal(hypothesis.apply(campaign)))
+        for hypothesis in hypotheses
+    ]
     best = int(np.argmin(misfits_m))
     if misfits_m[best] < min(IMPLAUSIBLE_M, written_m / FAR_BETTER):
         hypothesis = hypotheses[best]
@@ -85,19 +96,19 @@ def _list_hypotheses(campaign: Campaign) -> list[Hypothesis]:
     return hypotheses
 
 
-def find_swapped_features(campaign: Campaign) -> list[Fault]:
+def _find_swapped(campaign: Campaign, fitted: Fit) -> list[Fault]:
     """Find a feature whose measurements often fit another one of its kind.
 
-    Sockets alone have a sharper test, see `swapped_places`. Returns at most one fault.
+    Sockets alone have a sharper test, see `swapped_places`.
     """
     # Components of one measurement would be compared one by one.
     channels = campaign.measuring.channels
     if any(channel.component is not None for channel in channels):
         return []
-    return report_swapped(_compare_features(campaign), campaign)
+    return report_swapped(_compare_features(campaign, fitted), campaign)
 
 
-def _compare_features(campaign: Campaign) -> PlaceComparison:
+def _compare_features(campaign: Campaign, fitted: Fit) -> PlaceComparison:
     """Compare each measurement with its feature and the others of its kind that the
     nominal robot may touch."""
     measurements = campaign.measurements
@@ -106,30 +117,22 @@ def _compare_features(campaign: Campaign) -> PlaceComparison:
     keys = np.column_stack([measurements.session, measurements.channel])
     first, place_index = group_equal_rows(keys)
     session, channel = keys[first].T
-    distance = _compute_distances(campaign)[:, channel]
+    distance = _compute_distances(campaign, fitted)[:, channel]
     kinds = np.array([channels[number].kind.name for number in channel])
-    is_alternative = session == session[place_index][:, None]
-    is_alternative &= kinds == kinds[place_index][:, None]
-    is_alternative &= distance < IMPLAUSIBLE_M
-    rows = np.arange(len(measurements))
-    is_alternative[rows, place_index] = False
-    others = np.where(is_alternative, distance, np.inf)
+    is_comparable = session == session[place_index][:, None]
+    is_comparable &= kinds == kinds[place_index][:, None]
+    is_comparable &= distance < IMPLAUSIBLE_M
     # A channel without a feature has no other of its kind, and is never reported.
     features = np.array([channels[number].feature or 0 for number in channel])
-    return PlaceComparison(
-        place_index=place_index,
-        places=np.column_stack([session, features]),
-        from_named=distance[rows, place_index],
-        from_nearest=others.min(axis=1),
-        nearest=others.argmin(axis=1),
-    )
+    places = np.column_stack([session, features])
+    return PlaceComparison.of(place_index, places, distance, is_comparable)
 
 
-def _compute_distances(campaign: Campaign) -> np.ndarray:
+def _compute_distances(campaign: Campaign, fitted: Fit) -> np.ndarray:
     """Distance of N measurements from the feature of each of C channels with the nominal
     robot, (N, C) array, m."""
-    fitted = _fit_nominal(campaign)
-    model, estimate = fitted.model, fitted.estimate
+    model = fitted.model
+    estimate = fitted.estimate
     observations = separate_measurements(campaign.measurements)
     conditions = evaluate_conditions(model, estimate, observations.states)
     poses = predict(model, estimate, observations, conditions)
@@ -142,11 +145,10 @@ def _compute_distances(campaign: Campaign) -> np.ndarray:
     return np.stack(distances, axis=1)
 
 
-def _compute_misfit(campaign: Campaign) -> float:
+def _compute_misfit(fitted: Fit) -> float:
     """Residual of the nominal robot, m, a trimmed RMS: a few wrong rows are no fault of
     all."""
-    residual = _fit_nominal(campaign).residual
-    return compute_trimmed_rms(np.linalg.norm(residual[:, :3], axis=1))
+    return compute_trimmed_rms(np.linalg.norm(fitted.residual[:, :3], axis=1))
 
 
 def _fit_nominal(campaign: Campaign) -> Fit:

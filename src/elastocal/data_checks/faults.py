@@ -16,10 +16,7 @@ from scipy.constants import g, pound_force
 
 from elastocal.campaigns.campaign import group_equal_rows
 from elastocal.counting import format_digits
-from elastocal.data_checks.contact_faults import (
-    find_contact_faults,
-    find_swapped_features,
-)
+from elastocal.data_checks.contact_faults import find_contact_faults
 from elastocal.data_checks.hypotheses import find_better_interpretation
 from elastocal.data_checks.placement import (
     IMPLAUSIBLE_M,
@@ -148,11 +145,7 @@ def find_faults(campaign: Campaign) -> tuple[Fault, ...]:
     own.
     """
     if campaign.measuring.channels:
-        for find in (find_swapped_places, find_contact_faults, find_swapped_features):
-            faults = find(campaign)
-            if faults:
-                return tuple(faults)
-        return ()
+        return tuple(find_swapped_places(campaign) or find_contact_faults(campaign))
     for find in (find_constant_columns, find_better_interpretation):
         faults = find(campaign)
         if faults:

@@ -118,6 +118,34 @@ class PlaceComparison:
     from_nearest: np.ndarray
     nearest: np.ndarray
 
+    @classmethod
+    def of(
+        cls,
+        place_index: np.ndarray,
+        places: np.ndarray,
+        distance: np.ndarray,
+        is_comparable: np.ndarray,
+    ) -> PlaceComparison:
+        """Compare each measurement with the place that it names and with the others.
+
+        Parameters
+        ----------
+        place_index, places : as attributes.
+        distance : (N, G) array, of each measurement from each place, m.
+        is_comparable : (N, G) bool array, places that the measurement may be of.
+        """
+        rows = np.arange(len(distance))
+        is_other = is_comparable.copy()
+        is_other[rows, place_index] = False
+        others = np.where(is_other, distance, np.inf)
+        return cls(
+            place_index=place_index,
+            places=places,
+            from_named=distance[rows, place_index],
+            from_nearest=others.min(axis=1),
+            nearest=others.argmin(axis=1),
+        )
+
     def find_swapped(self) -> np.ndarray:
         """Find the measurements (N,) that fit another place much better than theirs."""
         is_closer = _CLOSER * self.from_nearest < self.from_named
@@ -128,17 +156,10 @@ def _compare_places(touches: _Touches) -> PlaceComparison:
     """Compare each measurement with the place that it names and with the others."""
     places, position = _fit_places(touches)
     distance = np.linalg.norm(position[:, None] - places, axis=2)
-    rows = np.arange(len(position))
     session = touches.places[:, 0]
-    is_alternative = session[touches.place_index][:, None] == session
-    is_alternative[rows, touches.place_index] = False
-    alternatives = np.where(is_alternative, distance, np.inf)
-    return PlaceComparison(
-        place_index=touches.place_index,
-        places=touches.places,
-        from_named=distance[rows, touches.place_index],
-        from_nearest=alternatives.min(axis=1),
-        nearest=alternatives.argmin(axis=1),
+    has_same_session = session[touches.place_index][:, None] == session
+    return PlaceComparison.of(
+        touches.place_index, touches.places, distance, has_same_session
     )
 
 
