@@ -45,7 +45,7 @@ from elastocal.residual_model.selection import (
 from elastocal.validation.transfer import find_beyond_campaign, find_larger_loads
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from elastocal.fitting.least_squares import Fit
     from elastocal.fitting.model import Estimate, Model
@@ -391,12 +391,10 @@ def compute_pose_sensitivities(
     Returns (N, 6, P): displacement and rotation, m and rad, base axes. Arguments as in
     `predict_poses`.
     """
-    count = len(reported_angles)
-    sensitivities = np.empty((count, 6, len(calibrated.covariance)))
     blocks = generate_pose_sensitivities(calibrated, reported_angles, wrench)
-    for chunk, block in zip(split_into_chunks(count), blocks, strict=True):
-        sensitivities[chunk] = block
-    return sensitivities
+    return fill_from_blocks(
+        (len(reported_angles), 6, len(calibrated.covariance)), blocks
+    )
 
 
 def generate_pose_sensitivities(
@@ -448,6 +446,20 @@ def build_observations(states: States) -> Observations:
         np.zeros((count, 3)),
         np.broadcast_to(np.eye(3), (count, 3, 3)),
     )
+
+
+def fill_from_blocks(
+    shape: tuple[int, ...], blocks: Iterable[np.ndarray]
+) -> np.ndarray:
+    """Fill an array of this shape from blocks of its consecutive rows, of which only one
+    is in memory beside it."""
+    filled = np.empty(shape)
+    first = 0
+    for block in blocks:
+        last = first + len(block)
+        filled[first:last] = block
+        first = last
+    return filled
 
 
 def split_into_chunks(count: int, size: int = _CHUNK) -> list[slice]:

@@ -16,6 +16,7 @@ from scipy.linalg import hadamard
 
 from elastocal.application.calibrated import (
     build_observations,
+    fill_from_blocks,
     move_to_end_effector,
     split_into_chunks,
     zero_coefficients,
@@ -94,11 +95,8 @@ class LeftOutEffects:
         then those by a standard deviation along each axis of their uncertainty, m and
         rad, base axes.
         """
-        fields = np.empty((len(states), 6, 1 + self.covariance_factor.shape[1]))
-        chunks = split_into_chunks(len(states))
-        for chunk, block in zip(chunks, self.generate_fields(states), strict=True):
-            fields[chunk] = block
-        return fields
+        shape = (len(states), 6, 1 + self.covariance_factor.shape[1])
+        return fill_from_blocks(shape, self.generate_fields(states))
 
     def generate_fields(self, states: States) -> Iterator[np.ndarray]:
         """Generate the result of `compute_fields` in blocks of consecutive states, so
