@@ -188,7 +188,7 @@ def test_sizes_of_the_pose_error_without_probability_do_not_matter(monkeypatch):
     monkeypatch.setattr(search, "NEGLIGIBLE_LOG_WEIGHT", -np.inf)
     found = search_models(make_problem(rows, TERMS, tau=tau)[0])
     fewest = min(counts)
-    monkeypatch.setattr(search, "_NEGLIGIBLE_FOR_EXTENSIONS", -np.inf)
+    monkeypatch.setattr(search, "_NEGLIGIBLE_FOR_NEIGHBOURS", -np.inf)
     counts.clear()
     expected = search_models(make_problem(rows, TERMS, tau=tau)[0])
     assert fewest < min(counts)
@@ -196,3 +196,43 @@ def test_sizes_of_the_pose_error_without_probability_do_not_matter(monkeypatch):
         model.term_indices for model in expected.models
     ]
     assert found.probabilities == pytest.approx(expected.probabilities, abs=1e-9)
+
+
+def test_a_term_that_explains_a_large_pose_error_is_evaluated_at_small_ones():
+    """Without the term only large sizes are likely, and with it only small ones. The
+    search drops sizes that no single term makes likely, hence the tolerance."""
+    rows = make_rows(0, poses=40, candidates=2).drawn(np.random.default_rng(1), 0.5)
+    draws = np.random.default_rng(2)
+    by_pose = draws.standard_normal((40, rows.jacobian.shape[1]))
+    candidates = rows.candidates.copy()
+    candidates[:, 0] = (rows.jacobian * by_pose[rows.pose]).sum(axis=1)
+    rows = replace(
+        rows, candidates=candidates, residual=rows.residual + 50 * candidates[:, 0]
+    )
+    tau = [0.0, *(0.25 * 2.0 ** np.arange(10))]
+    terms = (make_term("offset", (1,), 0), make_term("offset", (2,), 1))
+    problem, _ = make_problem(rows, terms, tau=tau)
+    found = problem.initial_search.duplicate()
+    smallest, _ = found.evaluated[()].likely_pose_errors_rad
+    assert found.evaluate((0,)).pose_error_rad < smallest / 2
+    nothing, alone = (
+        evaluate_model(
+            problem.statistics,
+            terms[:count],
+            problem.grid,
+            problem.log_pose,
+            np.full(count, problem.settings.scale_center),
+        ).log_evidence
+        for count in (0, 1)
+    )
+    log_prior = problem.prior.compute_log_odds(terms[:1])
+    assert found.log_odds[0,] == pytest.approx(alone - nothing + log_prior, abs=1e-3)
+
+
+def test_a_model_is_evaluated_even_if_the_likely_sizes_of_its_neighbour_were_dropped():
+    rows = make_rows(0, poses=40, candidates=2)
+    terms = (make_term("offset", (1,), 0), make_term("offset", (2,), 1))
+    found = make_problem(rows, terms, tau=TAU)[0].initial_search.duplicate()
+    nothing = found.evaluated[()]
+    found.evaluated[()] = replace(nothing, likely_pose_errors_rad=(64.0, 64.0))
+    assert np.isfinite(found.evaluate((1,)).log_odds)

@@ -64,9 +64,9 @@ def test_statistics_are_those_of_dense_generalized_least_squares(
     assert len(computed.gram) == (len(TAU) if columns_a_row else 1)
     scale = 1e-9 * np.abs(gram).max()
     for blocks, expected in (
-        (computed.gram_rows(columns), gram),
+        (computed.gram_rows(columns, columns), gram),
         (computed.gram_blocks(columns), gram),
-        (computed.at([1, 3]).gram_rows(columns[:2]), gram[[1, 3], :2]),
+        (computed.at([1, 3]).gram_rows(columns[:2], columns[1:]), gram[[1, 3], :2, 1:]),
     ):
         np.testing.assert_allclose(blocks, expected, rtol=1e-9, atol=scale)
     assert_close(computed.score, score)

@@ -59,9 +59,12 @@ _TELLING_TERMS = 10
 # are dropped for the rest of the search. Models that come near to the best one differ
 # from it by a few terms, which cannot make up for a hundred orders of magnitude.
 _HOPELESS_LOG_WEIGHT = -300.0
-# Below this log weight under a model, a size of the pose error counts for nothing when
-# the model is extended by a term.
-_NEGLIGIBLE_FOR_EXTENSIONS = -40.0
+# Below this log weight under a model, a size of the pose error counts for nothing under
+# its neighbours, which have one term more or less.
+_NEGLIGIBLE_FOR_NEIGHBOURS = -40.0
+# A model is evaluated at the sizes that are likely under its neighbour, and at further
+# ones as long as their log weight may be above this.
+_NEGLIGIBLE_FURTHER = -25.0
 # Steps in the grid of the pose error, to either side of its size, that measurements
 # simulated with this size can make likely.
 POSE_ERROR_REACH = 2
@@ -286,6 +289,7 @@ class BeamSearch:
     empty_evidence : of the declared model alone
     log_odds : approximate posterior log odds of each model that was met
     scales : scale of each term at which the log odds were obtained
+    neighbours : the model with one term more or less by which a model was met
     evaluated : models that were evaluated in full
     extended : models that were extended by every term
     """
@@ -308,11 +312,12 @@ class BeamSearch:
         self._slots = np.array(
             [slots.setdefault(term.slot, len(slots)) for term in problem.terms], int
         )
-        self.empty_evidence = self._evaluate_in_full((), ())
         self.log_odds: dict[TermSet, float] = {(): 0.0}
         self.scales: dict[TermSet, tuple[float, ...]] = {(): ()}
+        self.neighbours: dict[TermSet, TermSet] = {}
         self.evaluated: dict[TermSet, ScoredModel] = {}
         self.extended: set[TermSet] = set()
+        self.empty_evidence, _ = self._evaluate_in_full((), ())
         self.extend(())
         self.evaluate(())
 
@@ -321,6 +326,7 @@ class BeamSearch:
         duplicate = copy(self)
         duplicate.log_odds = self.log_odds.copy()
         duplicate.scales = self.scales.copy()
+        duplicate.neighbours = self.neighbours.copy()
         duplicate.evaluated = self.evaluated.copy()
         duplicate.extended = self.extended.copy()
         return duplicate
@@ -331,6 +337,7 @@ class BeamSearch:
             if log_odds > self.log_odds.get(model, -np.inf):
                 self.log_odds[model] = log_odds
                 self.scales[model] = search.scales[model]
+        self.neighbours |= search.neighbours
         self.evaluated |= search.evaluated
         self.extended |= search.extended
 
@@ -349,10 +356,10 @@ class BeamSearch:
             statistics,
             statistics.log_likelihood + self._log_pose[likely],
             self.problem.scaled_columns(model, self.scales[model]),
-            [block.at(likely) for block in self._blocks],
+            [block.at(likely).select(open_terms) for block in self._blocks],
             self.problem.grid,
         )
-        by_pose_error += self._log_weights
+        by_pose_error += self._log_weights[open_terms]
         by_scale = log_sum_exp(by_pose_error, axis=0)
         if not model:
             self._drop_unlikely_pose_errors(by_pose_error, by_scale)
@@ -360,14 +367,22 @@ class BeamSearch:
         self._meet_extensions(model, open_terms, log_evidence, by_scale)
 
     def _select_likely_pose_errors(self, model: TermSet) -> slice:
-        """Select the sizes of the pose error that are likely under a model, or all as
-        long as it has not been evaluated."""
-        if model not in self.evaluated:
-            return slice(None)
-        smallest, largest = self.evaluated[model].likely_pose_errors_rad
+        """Select the sizes of the pose error that are likely under a model, or under
+        the neighbour by which it was met if it has not been evaluated.
+
+        These are all sizes if neither has been evaluated, or if the search has dropped
+        the likely ones since.
+        """
+        evaluated = self.evaluated.get(model) or self.evaluated.get(
+            self.neighbours.get(model, model)
+        )
         sizes = self.statistics.pose_error_rad
+        smallest, largest = (0.0, np.inf)
+        if evaluated is not None:
+            smallest, largest = evaluated.likely_pose_errors_rad
         first = int(np.searchsorted(sizes, smallest))
-        return slice(first, int(np.searchsorted(sizes, largest, "right")))
+        stop = int(np.searchsorted(sizes, largest, "right"))
+        return slice(first, stop) if first < stop else slice(0, len(sizes))
 
     def _drop_unlikely_pose_errors(
         self, by_pose_error: np.ndarray, by_scale: np.ndarray
@@ -392,7 +407,7 @@ class BeamSearch:
             ]
         )
         self._keep_pose_errors((weights > NEGLIGIBLE_LOG_WEIGHT).any(axis=1))
-        self.empty_evidence = self._evaluate_in_full((), ())
+        self.empty_evidence, _ = self._evaluate_in_full((), ())
 
     def _meet_extensions(
         self,
@@ -408,7 +423,7 @@ class BeamSearch:
         model : terms
         open_terms : indices of the terms that may join
         log_evidence : of the model at the scales at which it was met
-        by_scale : (number of terms, S), log evidence with each term added
+        by_scale : (number of open terms, S), log evidence with each of these added
         """
         terms = self.problem.terms
         prior = self.problem.prior
@@ -417,24 +432,26 @@ class BeamSearch:
         offset = self.log_odds[model] - log_evidence
         gains = (log_sum_exp(by_scale, axis=1) + offset).tolist()
         best_scales = self.problem.grid.scales[by_scale.argmax(axis=1)].tolist()
-        first_location = self.single_term_log_prior.tolist()
+        first_location = self.single_term_log_prior[open_terms].tolist()
         locations = Counter(terms[n].mechanism for n in model)
         scales = self.scales[model]
-        for number in open_terms.tolist():
-            log_prior = first_location[number]
+        for number, gain, best_scale, log_prior in zip(
+            open_terms.tolist(), gains, best_scales, first_location, strict=True
+        ):
             count = locations.get(terms[number].mechanism)
             if count:
                 log_prior = prior.log_odds_change(terms[number], count)
             index = bisect(model, number)
             larger = (*model[:index], number, *model[index:])
-            log_odds = gains[number] + log_prior
+            log_odds = gain + log_prior
             if log_odds > self.log_odds.get(larger, -np.inf):
                 self.log_odds[larger] = log_odds
                 self.scales[larger] = (
                     *scales[:index],
-                    best_scales[number],
+                    best_scale,
                     *scales[index:],
                 )
+                self.neighbours[larger] = model
 
     def _keep_pose_errors(self, kept: np.ndarray | np.bool_) -> None:
         """Continue with some of the sizes of the pose error only, (T,) bool.
@@ -449,25 +466,51 @@ class BeamSearch:
 
     def _evaluate_in_full(
         self, model: TermSet, start: Iterable[float]
-    ) -> ModelEvidence:
-        return evaluate_model(
-            self.statistics,
-            [self.problem.terms[n] for n in model],
-            self.problem.grid,
-            self._log_pose,
-            start,
-        )
+    ) -> tuple[ModelEvidence, np.ndarray]:
+        """Evaluate a model at the sizes of the pose error that can be likely under it;
+        these sizes come second."""
+        terms = [self.problem.terms[n] for n in model]
+        likely = self._select_likely_pose_errors(model)
+        while True:
+            statistics = self.statistics.at(likely)
+            evidence = evaluate_model(
+                statistics, terms, self.problem.grid, self._log_pose[likely], start
+            )
+            wider = self._widen(likely, evidence.log_pose_posterior)
+            if wider == likely:
+                return evidence, statistics.pose_error_rad
+            likely = wider
+            start = evidence.scales
+
+    def _widen(self, sizes: slice, log_weights: np.ndarray) -> slice:
+        """Add the next size of the pose error at each end of consecutive ones, unless
+        its weight is negligible.
+
+        The log weights fall faster and faster from their peak on, so that the next one
+        is at most where a line through the last two leads.
+        """
+        first = sizes.start
+        stop = sizes.stop
+        # A single size has no slope: both ends are open.
+        slopes = np.diff(log_weights) if len(log_weights) > 1 else np.zeros(1)
+        least = log_weights.max() + _NEGLIGIBLE_FURTHER
+        if log_weights[0] - slopes[0] > least:
+            first = max(first - 1, 0)
+        if log_weights[-1] + slopes[-1] > least:
+            stop = min(stop + 1, len(self._log_pose))
+        return slice(first, stop)
 
     def evaluate(self, model: TermSet) -> ScoredModel:
         """Evaluate a model in full, and meet it without each of its terms."""
         default_scales = (self.problem.settings.scale_center,) * len(model)
-        evidence = self._evaluate_in_full(model, self.scales.get(model, default_scales))
+        evidence, sizes = self._evaluate_in_full(
+            model, self.scales.get(model, default_scales)
+        )
         terms = self.problem.terms
         log_prior = self.problem.prior.compute_log_odds(terms[n] for n in model)
         log_odds = evidence.log_evidence - self.empty_evidence.log_evidence + log_prior
-        sizes = self.statistics.pose_error_rad
         log_weights = evidence.log_pose_posterior
-        likely = sizes[log_weights > log_weights.max() + _NEGLIGIBLE_FOR_EXTENSIONS]
+        likely = sizes[log_weights > log_weights.max() + _NEGLIGIBLE_FOR_NEIGHBOURS]
         scored = ScoredModel(
             model,
             log_odds,
@@ -478,8 +521,9 @@ class BeamSearch:
         self.log_odds[model] = log_odds
         self.scales[model] = tuple(evidence.scales.tolist())
         self.evaluated[model] = scored
-        if log_odds == max(self.log_odds.values()):
-            self._keep_pose_errors(evidence.log_pose_posterior > _HOPELESS_LOG_WEIGHT)
+        is_best = log_odds == max(self.log_odds.values())
+        if is_best and len(sizes) == len(self._log_pose):
+            self._keep_pose_errors(log_weights > _HOPELESS_LOG_WEIGHT)
         self._meet_smaller_models(model, evidence, log_prior)
         return scored
 
@@ -500,6 +544,7 @@ class BeamSearch:
                 )
                 self.log_odds[smaller] = gain + log_prior - log_prior_change
                 self.scales[smaller] = scales[:index] + scales[index + 1 :]
+                self.neighbours[smaller] = model
 
     def choose_best_variants(self, numbers: Iterable[int]) -> TermSet:
         """Of some terms, choose the best single one of each slot; rising indices."""

@@ -372,14 +372,13 @@ class SufficientStatistics:
         """Index of the size of the pose error that is nearest to a given one."""
         return int(np.argmin(np.abs(self.pose_error_rad - pose_error_rad)))
 
-    def gram_rows(self, columns: np.ndarray) -> np.ndarray:
-        """Rows (T, D, K) of W'MW of some columns (D,)."""
-        # `take` would copy the whole matrix first, because it is not contiguous.
-        gram = self.gram[:, columns]
+    def gram_rows(self, columns: np.ndarray, others: np.ndarray) -> np.ndarray:
+        """Products (T, D, A) of some columns (D,) of W'MW with others (A,)."""
+        gram = self.gram[:, columns[:, None], others]
         if not self.low_rank.shape[2]:
             return gram
         low_rank = self.low_rank[:, columns]
-        return gram - low_rank @ self.low_rank.swapaxes(-1, -2)
+        return gram - low_rank @ self.low_rank[:, others].swapaxes(-1, -2)
 
     def gram_blocks(self, columns: np.ndarray) -> np.ndarray:
         """Blocks (T, ..., D, D) of W'MW of some columns (..., D)."""
