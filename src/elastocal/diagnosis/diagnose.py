@@ -737,7 +737,7 @@ def _add_effects(
     )
     models = (declared, full_model)
     refusal, kept_in_sample = _refuse_adoption(
-        subset, evidence, models, context.settings
+        rows, evidence, full_model, context.settings
     )
     evidence = replace(
         evidence,
@@ -799,28 +799,25 @@ def _list_compared(
 
 
 def _refuse_adoption(
-    subset: FittedSubset,
+    rows: _SettledRows,
     evidence: Evidence,
-    models: tuple[Fit, Fit],
+    full_model: Fit,
     settings: Settings,
 ) -> tuple[list[str], Fit | None]:
     """Say why the effects found do not enter the model; nothing if they do, or if there
     are none. The fit to the search sample with which they are compared comes second.
 
-    `models`: without and with the effects, fitted to all observations.
+    `full_model`: with the effects, fitted to all observations.
     """
     if not evidence.conclusion.best.named:
         return [], None
     if not evidence.expected_to_help:
         return [adoption.TOO_UNCERTAIN], None
+    subset = rows.subset
     sample = subset.search_sample
-    declared, full_model = models
     if sample is not subset.case.observations:
-        declared, full_model = (
-            _refit_from(fitted, sample, fitted.noise, INTERMEDIATE_TOLERANCE)
-            for fitted in models
-        )
-    kept = _fit_kept(evidence, declared, sample, settings)
+        full_model = rows.fitted
+    kept = _fit_kept(evidence, subset.declared, sample, settings)
     predicted = model_averaging.predict_gain(
         evidence.design.problem, evidence.posterior, evidence.named_model
     )
