@@ -45,6 +45,10 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.settings import Settings
 
     TermSet = tuple[int, ...]
+    # Terms, pose error and scales of a model; its columns and coefficients at the index
+    # of that pose error.
+    ModelKey = tuple[TermSet, float, tuple[float, ...]]
+    Mode = tuple[np.ndarray, np.ndarray, int]
 
 # Occam's window in log odds: models this far below the best one hold no probability
 # that is reported.
@@ -121,7 +125,7 @@ class SearchProblem:
         widths = [len(of_term) for of_term in columns]
         return np.concatenate([np.zeros(0, int), *columns]), np.repeat(scales, widths)
 
-    def find_mode(self, model: ScoredModel) -> tuple[np.ndarray, np.ndarray, int]:
+    def find_mode(self, model: ScoredModel) -> Mode:
         """Find the most probable coefficients of a model at its scales.
 
         Returns
@@ -130,6 +134,17 @@ class SearchProblem:
         coefficients : (D,), in plausible sizes
         pose_error_index : index of the model's pose error
         """
+        key = model.term_indices, model.pose_error_rad, tuple(model.scales.tolist())
+        if key not in self._modes:
+            self._modes[key] = self._compute_mode(model)
+        return self._modes[key]
+
+    @cached_property
+    def _modes(self) -> dict[ModelKey, Mode]:
+        """Modes that have been asked for."""
+        return {}
+
+    def _compute_mode(self, model: ScoredModel) -> Mode:
         columns, deviations = self.scaled_columns(model.term_indices, model.scales)
         index = self.statistics.nearest(model.pose_error_rad)
         gram = self.statistics.at(slice(index, index + 1)).gram_blocks(columns)[0]

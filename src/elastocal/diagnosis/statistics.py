@@ -23,7 +23,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import solve_triangular
+from scipy.linalg import blas, solve_triangular
 
 from elastocal.fitting.observations import batch_groups_by_size
 
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 # Upper bound on the products of poses with all columns that are in memory at once: 8 MB.
 _AT_ONCE = 1_000_000
+# Rows of a matrix that are copied at once.
+_STRIP = 256
 # A column is spanned by the declared ones if less than this share of its square is
 # left: that is rounding.
 _INSIDE = 1e-12
@@ -416,12 +418,21 @@ class _PoseErrorEquations:
         self._first_row = 0
 
     def _subtract_square(self, number: int, rows: np.ndarray) -> None:
-        """Subtract the product of some rows (r, K + 1) with themselves."""
+        """Subtract the product of some rows (r, K + 1) with themselves; of a dense
+        matrix only below its diagonal, see `eliminate_declared`."""
         if self.is_factored:
             chosen = slice(self._first_row, self._first_row + len(rows))
             self.low_rank[number, :, chosen] = rows.T
         else:
-            self.gram[number] -= rows.T @ rows
+            # BLAS adds the product where it is computed. The transposes have the
+            # column order that it expects, so that nothing is copied.
+            blas.dsyrk(
+                -1.0,
+                rows.T,
+                beta=1.0,
+                c=self.gram[number].T,
+                overwrite_c=1,
+            )
 
     def subtract_correction(self, block: PoseBlock) -> None:
         """Subtract the correction for the pose error of some poses."""
@@ -446,6 +457,8 @@ class _PoseErrorEquations:
             if tau:
                 coupling = solve_triangular(factors[number], coupling, lower=True)
                 self._subtract_square(number, coupling)
+                if not self.is_factored:
+                    _copy_below_diagonal(self.gram[number])
             eliminations.append(
                 Elimination(
                     factors[number],
@@ -455,6 +468,15 @@ class _PoseErrorEquations:
                 )
             )
         return eliminations
+
+
+def _copy_below_diagonal(matrix: np.ndarray) -> None:
+    """Make a square matrix symmetric by what stands below its diagonal, in place."""
+    for start in range(0, len(matrix), _STRIP):
+        strip = slice(start, start + _STRIP)
+        corner = np.tril(matrix[strip, strip])
+        matrix[strip, strip] = corner + np.tril(corner, -1).T
+        matrix[strip, strip.stop :] = matrix[strip.stop :, strip].T
 
 
 def compute_statistics(
