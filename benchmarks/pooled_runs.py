@@ -1,7 +1,8 @@
 """Reliability of stated probabilities, and wrong names, of several blind runs together.
 
 `python benchmarks/pooled_runs.py docs/blind_29_november_cases.parquet
-docs/blind_cases.parquet` prints a line for each bin with its 95 % interval (Clopper and
+docs/blind_cases.parquet`, with tables that `stated_probabilities.py --save` has written
+besides, prints a line for each bin with its 95 % interval (Clopper and
 Pearson, 1934), the largest error of a bin with 30 cases and what calibrated statements
 would show by chance, and how often one wrong mechanism is stated without alternatives if
 the cause is not in the catalogue. A row of a file is a case.

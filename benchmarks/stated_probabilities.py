@@ -1,9 +1,10 @@
-"""How often is a stated probability right? On simulated robots of the blind benchmark's
-development size, of which `--cases` are drawn by a seed.
+"""How often is a stated probability right? On simulated robots of a size of the blind
+benchmark, of which `--cases` are drawn by a seed.
 
 Prints the reliability diagram, wrong single names, the names that are right alone, and
-the joints of named effects, each with its 95 % interval. Choose settings with one seed
-and judge them with another.
+the joints of named effects, each with its 95 % interval. `--save FILE` writes a row of
+each case, which `pooled_runs.py` reads. Choose settings with one seed and judge them
+with another.
 """
 
 import argparse
@@ -28,13 +29,14 @@ CONFIG = Path(__file__).resolve().parents[1] / "config"
 MISPLACED_SETTING = "tilted_base"
 
 
-def diagnose_cases(count, seed, folder):
-    """Make and diagnose cases; return a row of scores and the locations of each."""
+def diagnose_cases(size, count, seed, folder):
+    """Make and diagnose the first cases of a size, which are a random sample; return a
+    row of scores and the locations of each."""
     plan = read_document(CONFIG / "blind.yaml")
     robots = CONFIG / "robots"
     rows = []
     locations = []
-    for case in list_cases(plan, "development", seed)[:count]:
+    for case in list_cases(plan, size, seed)[:count]:
         write_sealed_case(case, folder, folder / "sealed", robots)
         training, _ = read_cases((folder / case.name).as_posix(), robots.as_posix())
         verdict = diagnose(training, Settings(), seed).document
@@ -49,9 +51,15 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", type=int, default=180)
     parser.add_argument("--seed", type=int, default=11701)
+    parser.add_argument("--size", default="development", help="of config/blind.yaml")
+    parser.add_argument("--save", type=Path, help="table of the cases, as Parquet")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        cases, locations = diagnose_cases(arguments.cases, arguments.seed, Path(folder))
+        cases, locations = diagnose_cases(
+            arguments.size, arguments.cases, arguments.seed, Path(folder)
+        )
+    if arguments.save:
+        cases.to_parquet(arguments.save)
     reliability = tabulate_reliability(cases)
     print(reliability[reliability.group == "all"].round(3).to_string(index=False))
     outside = cases[cases.group == "outside"]
