@@ -437,13 +437,17 @@ class _PoseErrorEquations:
     def subtract_correction(self, block: PoseBlock) -> None:
         """Subtract the correction for the pose error of some poses."""
         declared = self.declared_count
+        products = block.products.reshape(-1, block.products.shape[2])
         for number in np.flatnonzero(self.sizes).tolist():
             tau = self.sizes[number]
             widened = 1.0 + tau**2 * block.eigenvalues
-            scaled = block.products * (tau / np.sqrt(widened))[..., None]
-            rows = scaled.reshape(-1, scaled.shape[2])
-            self.declared_rows[number] -= rows[:, :declared].T @ rows
-            self._subtract_square(number, np.ascontiguousarray(rows[:, declared:]))
+            factor = (tau / np.sqrt(widened)).reshape(-1, 1)
+            of_declared = factor * products[:, :declared]
+            of_others = factor * products[:, declared:]
+            declared_rows = self.declared_rows[number]
+            declared_rows[:, :declared] -= of_declared.T @ of_declared
+            declared_rows[:, declared:] -= of_declared.T @ of_others
+            self._subtract_square(number, of_others)
             self.log_dets[number] += np.log1p(tau**2 * block.eigenvalues).sum()
         self._first_row += block.eigenvalues.size
 
