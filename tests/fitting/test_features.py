@@ -18,8 +18,10 @@ from elastocal.fitting.features import (
     list_feature_parameters,
     list_fitted_features,
 )
-from elastocal.fitting.least_squares import register_placement
+from elastocal.fitting.least_squares import fit_model, register_placement
+from elastocal.fitting.linearization import linearize_residual
 from elastocal.fitting.model import apply_step, list_parameters
+from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import select_states
 from elastocal.measuring.channels import parse_measuring
 from elastocal_proof.plant.contacts import seat_in_socket, touch_plane
@@ -80,7 +82,7 @@ def test_sockets_have_a_middle_and_planes_have_none():
     assert find_middle(None, ()) is None
 
 
-def hold_in_two_sockets(folder):
+def hold_in_two_sockets(folder, features):
     """A case of a ball in two sockets, 50 mm apart, at two places."""
     workshop = open_workshop(3)
     socket_m = np.array([0.0, 0.05, 0.0])
@@ -90,7 +92,6 @@ def hold_in_two_sockets(folder):
             seat = seat_in_socket(workshop, place + row % 2 * socket_m, 1e-4)
             feature = f"socket{row % 2}"
             rows.append({"angles": seat, "feature": feature, "session": session})
-    features = {"socket0": {}, "socket1": {}}
     document = {"measured": "point", "frame": "unknown", "features": features}
     return build_contact_case(write_contacts(folder, document, rows))
 
@@ -99,7 +100,7 @@ def test_a_base_turns_about_the_middle_of_the_sockets(tmp_path):
     """Two near sockets hardly determine how the base is turned about the line through
     them. Turned about its origin, a base a metre away moves the sockets by the square of
     the turn, and fits crept along a bent path without an end."""
-    case = hold_in_two_sockets(tmp_path / "cell")
+    case = hold_in_two_sockets(tmp_path / "cell", {"socket0": {}, "socket1": {}})
     start = register_placement(case.model, case.observations)
     middle = np.mean(start.features, axis=0)
     turn = np.array([0.1, -0.05, 0.02])
@@ -114,6 +115,33 @@ def test_a_base_turns_about_the_middle_of_the_sockets(tmp_path):
     turned = start.frame_rotation[1] @ Rotation.from_rotvec(turn).as_matrix()
     np.testing.assert_allclose(moved.frame_rotation[1], turned, atol=1e-12)
     np.testing.assert_array_equal(moved.frame_position[0], start.frame_position[0])
+
+
+def test_a_turn_about_the_line_through_two_sockets_is_left_alone(tmp_path):
+    """No measurement shows it. If axes of the residual were fixed while the base turns,
+    joint errors that poses have in common would seem to show it, and the fit would turn
+    the base in each step."""
+    features = {
+        "socket0": {"position_m": [0, 0, 0], "std_m": 0},
+        "socket1": {"position_m": [0, 0.05, 0], "std_m": [0, 1e-4, 0]},
+    }
+    case = hold_in_two_sockets(tmp_path / "cell", features)
+    noise = Noise("declared", 1e-4, 1e-4, np.zeros(6), pose_rad=3e-4)
+    fitted = fit_model(case.model, case.observations, noise)
+    assert fitted.converged
+    linear_model = linearize_residual(
+        fitted.model, fitted.estimate, case.observations, fitted.conditions
+    )
+    sensitivities = linear_model.sensitivities
+    for session, rotation in enumerate(fitted.estimate.frame_rotation):
+        # The line of both sockets, in the axes of the base.
+        line = rotation.T @ [0.0, 1.0, 0.0]
+        middle = rotation.T @ (
+            [0.0, 0.025, 0.0] - fitted.estimate.frame_position[session]
+        )
+        turn = np.concatenate([np.cross(middle, line), line])
+        columns = slice(6 * session, 6 * session + 6)
+        np.testing.assert_allclose(sensitivities[..., columns] @ turn, 0.0, atol=1e-9)
 
 
 def test_a_feature_that_no_row_of_a_sample_touches_has_finite_values(tmp_path):

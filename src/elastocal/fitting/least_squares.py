@@ -40,7 +40,7 @@ from elastocal.measuring.catalogue import list_kinds
 from elastocal.mechanics.kinematics import align_points, compute_point_poses
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from elastocal.effects.conditions import Conditions
     from elastocal.effects.protocol import Parameter
@@ -415,8 +415,8 @@ class ParameterTraits:
         """Collect the traits of the parameters of a model; by default none is frozen."""
         parameters = list_parameters(model, estimate)
         penalty = [
-            0.0 if parameter.prior_std is None else parameter.prior_std**-2
-            for _, parameter in parameters
+            0.0 if std is None else std**-2
+            for std in _list_regularising_deviations(model, parameters)
         ]
         coupled_effects = {
             effect.key
@@ -753,6 +753,29 @@ class ArmijoLineSearch:
         present = get_parameter_values(self.problem.model, estimate)
         frozen = self.traits.frozen | self._curving()
         return self.traits.solve(gram, gradient, present, frozen).step
+
+
+def _list_regularising_deviations(
+    model: Model, parameters: Sequence[tuple[str, Parameter]]
+) -> list[float | None]:
+    """List the standard deviations by which steps are regularised: those of the priors,
+    and the plausible sizes of frames that contacts determine.
+
+    Two sockets do not show a turn about the line through them. A frame is at zero before
+    each step, so that this damping, Levenberg's, changes no result [1]_.
+
+    References
+    ----------
+    .. [1] Levenberg, A method for the solution of certain non-linear problems in least
+       squares, Quarterly of Applied Mathematics 2, 1944.
+    """
+    has_contacts = model.measuring is not None and model.rows > 1
+    return [
+        parameter.plausible
+        if has_contacts and parameter.prior_std is None and owner.startswith("frame ")
+        else parameter.prior_std
+        for owner, parameter in parameters
+    ]
 
 
 def compute_negative_compliances(fitted: Fit) -> np.ndarray:

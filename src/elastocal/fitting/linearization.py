@@ -39,7 +39,7 @@ from elastocal.fitting.model import (
     update_springs_and_masses,
 )
 from elastocal.fitting.observations import batch_groups_by_size
-from elastocal.mechanics.kinematics import compute_motion
+from elastocal.mechanics.kinematics import compute_motion, form_cross_matrices
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -270,7 +270,7 @@ class LinearModel:
     columns : FactoredSensitivities
         With respect to the P parameters. The components of fitted targets and the
         unknowns of features are additional coordinates, each of which moves one target
-        or one feature.
+        or one feature; turns of the axes of the residual come last, if there are any.
     coordinates : (S, C) array, displaced coordinates of the sites
     conditions : Conditions, at the displaced pose of this estimate
     """
@@ -306,15 +306,68 @@ def linearize(
     """
     conditions = update_springs_and_masses(model, estimate, conditions)
     by_coordinates = linearize_coordinates(model, estimate, observations, conditions)
+    return _differentiate(model, estimate, observations, conditions, by_coordinates, {})
+
+
+def linearize_residual(
+    model: Model, estimate: Estimate, observations: Observations, conditions: Conditions
+) -> LinearModel:
+    """Linearize a model and the axes of its residual; arguments as of `linearize`.
+
+    Residuals are in base axes, which turn with the frame of their session: a residual
+    r turns back by r x w if the frame turns by w. The difference matters where frames
+    are hardly determined, such as by two sockets in each session.
+    """
+    conditions = update_springs_and_masses(model, estimate, conditions)
+    by_coordinates = linearize_coordinates(model, estimate, observations, conditions)
+    turns: dict[int, int] = {}
+    # Single numbers have no axes.
+    if model.has_frame_parameters and model.rows > 1:
+        columns = by_coordinates.columns
+        residual = by_coordinates.residual
+        turned = -form_cross_matrices(residual.reshape(-1, 3))
+        jacobian = np.concatenate(
+            [columns.jacobian, turned.reshape(*residual.shape, 3)], axis=2
+        )
+        by_coordinates = replace(
+            by_coordinates, columns=replace(columns, jacobian=jacobian)
+        )
+        first = columns.jacobian.shape[2]
+        turns = dict(zip(model.sites.base[3:], range(first, first + 3), strict=True))
+    return _differentiate(
+        model, estimate, observations, conditions, by_coordinates, turns
+    )
+
+
+def _differentiate(
+    model: Model,
+    estimate: Estimate,
+    observations: Observations,
+    conditions: Conditions,
+    by_coordinates: LinearModel,
+    turns: Mapping[int, int],
+) -> LinearModel:
+    """Linearize with respect to the parameters, from the linearization with respect to
+    the coordinates.
+
+    `turns` names, for coordinates that turn the base, the last coordinates, which turn
+    the axes of the residual.
+    """
     jacobian = by_coordinates.columns.jacobian
     states = observations.states
     basis: list[Mapping[int, np.ndarray]] = []
     if model.has_frame_parameters:
         for session in estimate.sessions:
             in_session = (states.session == session).astype(float)
-            basis += [{coordinate: in_session} for coordinate in model.sites.base]
-    target_coordinates = range(model.sites.chain.coordinates, jacobian.shape[2])
-    basis += [{coordinate: np.ones(len(states))} for coordinate in target_coordinates]
+            for coordinate in model.sites.base:
+                functions = {coordinate: in_session}
+                if coordinate in turns:
+                    functions[turns[coordinate]] = in_session
+                basis.append(functions)
+    unknown_coordinates = range(
+        model.sites.chain.coordinates, jacobian.shape[2] - len(turns)
+    )
+    basis += [{coordinate: np.ones(len(states))} for coordinate in unknown_coordinates]
     for effect, values, shapes in zip(
         model.effects, estimate.coefficients, estimate.shapes, strict=True
     ):

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotri
 
 from elastocal.fitting.contact_density import compute_mean_strains
-from elastocal.fitting.linearization import linearize
+from elastocal.fitting.linearization import linearize_residual
 from elastocal.fitting.model import (
     compute_displaced_coordinates,
     compute_residuals,
@@ -448,7 +448,7 @@ class LeastSquaresProblem:
             if block.conditions is None:
                 residuals.append(self._compute_block_residual(block, estimate))
             else:
-                block.linear_model = linearize(
+                block.linear_model = linearize_residual(
                     self.model, estimate, block.observations, block.conditions
                 )
                 residuals.append(block.linear_model.residual)
@@ -456,7 +456,6 @@ class LeastSquaresProblem:
 
     def whiten(self) -> None:
         """Evaluate loads and whitening at the present estimate."""
-        self.whitened_at = self.estimate
         for block in self.blocks:
             if block.linear_model is not None:
                 block.conditions = block.linear_model.conditions
@@ -548,17 +547,6 @@ class LeastSquaresProblem:
             residual = self.residual
         else:
             residual = self._compute_residual(estimate)
-        # The whitening belongs to the base axes of the estimate at which it was
-        # computed, so turn the residual into these axes.
-        turn = (
-            self.whitened_at.frame_rotation.transpose(0, 2, 1) @ estimate.frame_rotation
-        )
-        # Single numbers have no axes.
-        if (turn != np.eye(3)).any() and self.model.rows > 1:
-            session = estimate.index_sessions(self.observations)
-            vectors = residual.reshape(len(residual), -1, 3)
-            turned = vectors @ turn[session].transpose(0, 2, 1)
-            residual = turned.reshape(residual.shape)
         weighted = self._whiten(residual * np.sqrt(weights)[:, None])
         squares = float((weighted**2).sum())
         if self.strains is None:
@@ -632,7 +620,7 @@ class LeastSquaresProblem:
         """Linearize a block that does not stay in memory, and update its loads and
         whitening."""
         conditions = self._get_conditions(block, self.estimate)
-        linear_model = linearize(
+        linear_model = linearize_residual(
             self.model, self.estimate, block.observations, conditions
         )
         block.coordinates = linear_model.coordinates
