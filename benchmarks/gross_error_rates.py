@@ -1,12 +1,13 @@
 """How often good rows are left out as gross errors, and wrong rows are not.
 
 Simulated campaigns of arms with six and seven axes: three reflectors on the flange,
-every pose without a load and with one. `python benchmarks/gross_error_rates.py effects
-CASES SEED` plants an effect that acts only somewhere: lost motion, stiffening,
-hysteresis, the end of a compensator's range, stretched poses; no row is wrong. `slips
-CASES SEED` makes 1 to 5 % of the rows wrong instead: lost beams, held points, mistyped
-angles, swapped rows, slipped units. It prints a line for each case, and the rates with
-95 % intervals (Clopper and Pearson, 1934).
+every pose without a load, and in one of three campaigns also with one. `python
+benchmarks/gross_error_rates.py effects CASES SEED [--poses 260]` plants an effect that
+acts only somewhere: lost motion, stiffening, hysteresis, the end of a compensator's
+range, stretched poses; no row is wrong. `slips CASES SEED` makes 1 to 5 % of the rows
+wrong instead: lost beams, held points, mistyped angles, swapped rows, slipped units. It
+prints a line for each case, and the rates with 95 % intervals (Clopper and Pearson,
+1934).
 """
 
 import argparse
@@ -60,10 +61,12 @@ class Robot:
     name: str
     simulated: object
     schedule: object
+    design: Design
 
 
-def draw_robot(seed):
-    """Draw an arm, its specimen with zero offsets, and the states of a campaign."""
+def draw_robot(seed, poses):
+    """Draw an arm, its specimen with zero offsets, and the states of a campaign of so
+    many poses."""
     name = ARMS[seed % len(ARMS)]
     arm = read_arm(ROBOTS / f"{name}.yaml")
     draws = np.random.default_rng([seed, 1])
@@ -74,10 +77,9 @@ def draw_robot(seed):
     specimen = replace(
         draw_specimen(arm, seed), repeatability_rad=(POSE_RAD,) * arm.joints
     )
-    design = replace(DESIGN, ladder=LADDERS[draws.integers(len(LADDERS))])
-    return Robot(
-        name, apply_defects(specimen, offsets), draw_schedule(arm, design, seed)
-    )
+    design = replace(DESIGN, poses=poses, ladder=LADDERS[draws.integers(len(LADDERS))])
+    schedule = draw_schedule(arm, design, seed)
+    return Robot(name, apply_defects(specimen, offsets), schedule, design)
 
 
 def plant_effect(robot, effect, seed):
@@ -153,12 +155,13 @@ def measure(robot, seed):
     return {name: np.array(values) for name, values in table.items()}
 
 
-def slip(table, seed):
-    """Make 1 to 5 % of the rows wrong; rows that are wrong, (N,) of bool."""
+def slip(table, seed, shares):
+    """Make a share of the rows wrong, from the lower to the higher one of two; rows that
+    are wrong, (N,) of bool."""
     draws = np.random.default_rng([seed, 4])
     count = len(table["pose"])
     wrong = np.zeros(count, bool)
-    wanted = draws.uniform(0.01, 0.05) * count
+    wanted = draws.uniform(*shares) * count
     damaged = {name: values.copy() for name, values in table.items()}
     position = np.column_stack([table[axis] for axis in "xyz"])
     original = position.copy()
@@ -193,7 +196,7 @@ def slip(table, seed):
 def diagnose(robot, table):
     """Verdict on a table."""
     joints = robot.simulated.arm.joints
-    first = DESIGN.poses - DESIGN.held_out
+    first = robot.design.poses - robot.design.held_out
     document = {
         "campaign": "rates",
         "robot": robot.name,
@@ -231,13 +234,13 @@ def summarize(verdict):
     return verdict["verdict"], sorted(effects)
 
 
-def study_effects(cases, seed):
+def study_effects(cases, seed, poses):
     """Left-out rows of campaigns in which no row is wrong."""
     left_out = []
     rows = []
     for case in range(seed, seed + cases):
         effect = LOCAL_EFFECTS[case // len(ARMS) % len(LOCAL_EFFECTS)]
-        robot = plant_effect(draw_robot(case), effect, case)
+        robot = plant_effect(draw_robot(case, poses), effect, case)
         table = measure(robot, case)
         start = time.process_time()
         verdict = diagnose(robot, table)
@@ -257,14 +260,14 @@ def study_effects(cases, seed):
     )
 
 
-def study_slips(cases, seed):
+def study_slips(cases, seed, poses, shares):
     """Wrong rows that are left out, and verdicts that stay as without them."""
     counts = np.zeros(5, int)
     for case in range(seed, seed + cases):
         effect = ORDINARY_EFFECTS[case // len(ARMS) % len(ORDINARY_EFFECTS)]
-        robot = plant_effect(draw_robot(case), effect, case)
+        robot = plant_effect(draw_robot(case, poses), effect, case)
         table = measure(robot, case)
-        damaged, wrong = slip(table, case)
+        damaged, wrong = slip(table, case, shares)
         start = time.process_time()
         verdict = diagnose(robot, damaged)
         seconds = time.process_time() - start
@@ -291,6 +294,21 @@ if __name__ == "__main__":
     parser.add_argument("study", choices=("effects", "slips"))
     parser.add_argument("cases", type=int)
     parser.add_argument("seed", type=int)
+    parser.add_argument(
+        "--poses",
+        type=int,
+        default=DESIGN.poses,
+        help="poses of a campaign; of more than some 130 a sample is weighed",
+    )
+    parser.add_argument(
+        "--wrong",
+        type=float,
+        nargs=2,
+        default=(0.01, 0.05),
+        help="lowest and highest share of wrong rows",
+    )
     asked = parser.parse_args()
-    study = study_effects if asked.study == "effects" else study_slips
-    study(asked.cases, asked.seed)
+    if asked.study == "effects":
+        study_effects(asked.cases, asked.seed, asked.poses)
+    else:
+        study_slips(asked.cases, asked.seed, asked.poses, asked.wrong)

@@ -110,6 +110,28 @@ def test_a_problem_about_a_model_with_an_effect_is_the_one_about_the_model_witho
     assert score[1] / np.sqrt(gram[1, 1]) > 20
 
 
+def test_an_effect_that_stays_as_fitted_is_neither_given_back_nor_fitted_again(
+    campaign,
+):
+    key = "joint_offset@3"
+    model, estimate = with_effect(campaign, key, [0.0])
+    noise = campaign.declared.noise
+    fitted = fit_model(model, campaign.observations, noise, estimate)
+    design = build_candidate_design(
+        fitted,
+        campaign.observations,
+        [campaign.candidates[key]],
+        SETTINGS,
+        fixed_keys=frozenset({key}),
+    )
+    rows = design.whitened.rows
+    np.testing.assert_allclose(rows.residual, fitted.whiten(fitted.residual))
+    assert rows.declared.shape[2] == len(fitted.parameters) - 1
+    statistics = design.problem.statistics
+    standard_errors = statistics.score[0][0] / np.sqrt(statistics.gram[0][0, 0])
+    assert abs(standard_errors) < 5
+
+
 def test_a_design_without_rows_keeps_its_results(campaign):
     design = design_of(campaign)
     assert design.problem.initial_search.log_odds

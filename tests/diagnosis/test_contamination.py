@@ -8,6 +8,8 @@ import pytest
 from bad_rows import damaged
 from made_folders import PLAN, make_folder, make_table
 
+from elastocal.diagnosis import contamination
+from elastocal.diagnosis.candidate_design import build_candidate_design
 from elastocal.diagnosis.contamination import (
     compute_agreement_p_value,
     weigh_gross_errors,
@@ -16,6 +18,7 @@ from elastocal.diagnosis.contamination import (
 from elastocal.diagnosis.fitted_subset import fit_subset
 from elastocal.diagnosis.gross_errors import OutlierTest
 from elastocal.diagnosis.settings import Settings
+from elastocal.fitting.least_squares import fit_model
 from elastocal.loop.whole import read_cases
 
 SETTINGS = Settings()
@@ -63,6 +66,43 @@ def test_a_wrong_row_is_left_out_and_a_good_suspect_is_not(cases, shift_m):
     assert np.flatnonzero(outcome.gross).tolist() == [11]
     assert outcome.probability[11] > 0.99
     assert (outcome.probability[[25, 30]] < 0.1).all()
+
+
+@pytest.mark.parametrize(
+    ("sample_share", "most_suspects", "are_fixed"),
+    [(1.0, 0.1, False), (0.5, 0.01, False), (0.5, 0.1, True)],
+)
+def test_effects_found_stay_as_fitted_beside_few_suspects_and_a_sample_of_the_rows(
+    cases, monkeypatch, sample_share, most_suspects, are_fixed
+):
+    """Either way wrong rows are left out and good suspects are not."""
+    designs = []
+
+    def build_and_keep(*arguments, **options):
+        designs.append(build_candidate_design(*arguments, **options))
+        return designs[-1]
+
+    monkeypatch.setattr(contamination, "build_candidate_design", build_and_keep)
+    # The second wrong row is so far off that it takes no part.
+    case = damaged(cases[0], {11: 2e-3, 17: 1e3})
+    key = "joint_offset@3"
+    model = case.model.with_effects([case.candidates[key]])
+    row = np.arange(len(case.campaign.measurements))
+    subset = fit_subset(case, ~np.isin(row, [11, 17]), SETTINGS)
+    fitted = fit_model(model, subset.search_sample, subset.noise)
+    suspects = np.isin(row, [11, 17, 25, 30])
+    assert 0.01 < suspects.mean() < 0.1
+    settings = replace(
+        SETTINGS,
+        gross_start_numbers=int(sample_share * case.model.rows * len(row)),
+        gross_error_probability=most_suspects,
+    )
+    outcome = weigh_gross_errors(fitted, subset.noise, case, suspects, settings)
+    assert np.flatnonzero(outcome.gross).tolist() == [11, 17]
+    assert (outcome.probability[[25, 30]] < 0.1).all()
+    assert len(designs) == 2
+    for design in designs:
+        assert (key in design.whitened.fixed_keys) == are_fixed
 
 
 def test_one_effect_beyond_an_edge_wins_over_as_many_accidents(

@@ -73,8 +73,8 @@ class WhitenedFit:
     """A fit linearised about its estimate for some observations, and whitened.
 
     The prediction of candidates that the fit has already is given back to the residual,
-    so that their coefficients count from zero. The rows are computed when they are
-    first asked for.
+    so that their coefficients count from zero, unless their effects stay as they were
+    fitted. The rows are computed when they are first asked for.
 
     Attributes
     ----------
@@ -82,18 +82,24 @@ class WhitenedFit:
     observations : M observations
     conditions : conditions of their states, loads at the undeflected robot
     candidate_keys : keys of all candidates
+    fixed_keys : keys of candidates whose effects stay as they were fitted; their
+        coefficients count from there
     """
 
     fitted: Fit
     observations: Observations
     conditions: Conditions
     candidate_keys: frozenset[str]
+    fixed_keys: frozenset[str] = frozenset()
 
     @cached_property
     def is_candidate(self) -> np.ndarray:
         """Which parameters of the fit belong to candidates, bool."""
+        return self._is_owned_by(self.candidate_keys)
+
+    def _is_owned_by(self, keys: frozenset[str]) -> np.ndarray:
         owners = [owner for owner, _ in self.fitted.parameters]
-        return np.isin(owners, list(self.candidate_keys))
+        return np.isin(owners, list(keys))
 
     @cached_property
     def linear_values(self) -> np.ndarray:
@@ -133,9 +139,8 @@ class WhitenedFit:
             return whitener.apply(values * root_weights.reshape(-1, *trailing_axes))
 
         columns = linearization.columns
-        contribution = columns.combine(
-            np.where(self.is_candidate, self.linear_values, 0.0)
-        )
+        is_returned = self._is_owned_by(self.candidate_keys - self.fixed_keys)
+        contribution = columns.combine(np.where(is_returned, self.linear_values, 0.0))
         no_candidates = FactoredSensitivities.of(
             [],
             whiten(linearization.coordinate_jacobian),
@@ -361,6 +366,7 @@ def build_candidate_design(
     candidates: Sequence[Candidate],
     settings: Settings,
     max_pose_error_rad: float = np.inf,
+    fixed_keys: frozenset[str] = frozenset(),
 ) -> CandidateDesign:
     """Gather everything that a fitted model might lack, for some observations.
 
@@ -371,6 +377,7 @@ def build_candidate_design(
     candidates : candidates of the catalogue
     settings : settings of the diagnosis
     max_pose_error_rad : largest size of the pose error to be considered
+    fixed_keys : keys of candidates whose effects stay as they were fitted
     """
     conditions = fitted.get_conditions(observations.states)
     available = fitted.model.available_inputs(observations.states)
@@ -391,7 +398,7 @@ def build_candidate_design(
     keys = frozenset(candidate.key for candidate in candidates)
     return CandidateDesign(
         fitted,
-        WhitenedFit(fitted, observations, conditions, keys),
+        WhitenedFit(fitted, observations, conditions, keys, fixed_keys),
         settings,
         tried,
         untestable,

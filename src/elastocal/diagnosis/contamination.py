@@ -202,7 +202,10 @@ def weigh_gross_errors(
     if not suspects.any():
         return certain
     sampled, observations = _sample_rows(case, suspects, settings)
-    problem = _Linearization.about(fitted, noise, case, observations, settings)
+    fixed_keys = _choose_fixed_effects(case, sampled, suspects, settings)
+    problem = _Linearization.about(
+        fitted, noise, case, observations, settings, fixed_keys
+    )
     is_suspect = suspects[sampled]
     hopeless = problem.distance > settings.gross_error_reach * problem.compute_reach()
     weighed = np.flatnonzero(is_suspect & ~hopeless)
@@ -214,7 +217,9 @@ def weigh_gross_errors(
     kept[weighed] = True
     if not kept.all():
         observations = select_states(observations, kept)
-        problem = _Linearization.about(fitted, noise, case, observations, settings)
+        problem = _Linearization.about(
+            fitted, noise, case, observations, settings, fixed_keys
+        )
     basis = problem.build_gross_errors(np.flatnonzero(is_suspect[kept]))
     probability = suspects.astype(float)
     probability[sampled[kept]] = _search_with_gross_errors(problem.design, basis)
@@ -224,6 +229,20 @@ def weigh_gross_errors(
     if p_value is not None and p_value <= settings.gross_group_level:
         gross[sampled[kept]] = False
     return Contamination(probability, gross, p_value)
+
+
+def _choose_fixed_effects(
+    case: Case, sampled: np.ndarray, suspects: np.ndarray, settings: Settings
+) -> frozenset[str]:
+    """Choose the candidates whose effects stay as they were fitted.
+
+    A few suspects among many other rows have not shaped the effects of a robust fit.
+    Beside a sample of these rows the effects stay therefore, and the search looks for
+    changes. Few are as many as are expected to be wrong in any campaign.
+    """
+    is_sample = len(sampled) < len(suspects)
+    are_few = suspects.mean() <= settings.gross_error_probability
+    return frozenset(case.candidates if is_sample and are_few else ())
 
 
 @dataclass(frozen=True)
@@ -249,11 +268,16 @@ class _Linearization:
         case: Case,
         observations: Observations,
         settings: Settings,
+        fixed_keys: frozenset[str],
     ) -> _Linearization:
-        """Linearise about a fit."""
+        """Linearise about a fit; `fixed_keys` as of `build_candidate_design`."""
         reference = evaluate_as_fit(fitted.model, observations, noise, fitted.estimate)
         design = build_candidate_design(
-            reference, observations, list(case.candidates.values()), settings
+            reference,
+            observations,
+            list(case.candidates.values()),
+            settings,
+            fixed_keys=fixed_keys,
         )
         roots = compute_sensor_roots(fitted.model, fitted.estimate, observations, noise)
         return cls(design, standardize_residual(reference.residual, noise, roots))
@@ -399,6 +423,7 @@ def _search_with_gross_errors(
     problem = replace(design, gross_errors=basis).problem
     terms = problem.terms
     fitted_keys = {effect.key for effect in design.reference_fit.model.effects}
+    fitted_keys -= design.whitened.fixed_keys
     fitted = problem.initial_search.choose_best_variants(
         number
         for number, term in enumerate(terms)
