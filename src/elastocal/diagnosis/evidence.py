@@ -335,9 +335,9 @@ def _condition_on_model(
     right *= deviations[:, None]
     if len(columns):
         for factor, rows in zip(factors, right, strict=True):
-            # A product with the inverse takes half the time of solving. No eigenvalue
-            # is below one, so that the inverse is as accurate. The transposes have the
-            # column order that BLAS expects, so that nothing is copied.
+            # A product with the inverse takes half the time of solving, and is accurate
+            # enough, because no eigenvalue is below one. The transposes have the column
+            # order that BLAS expects, so that nothing is copied.
             inverse = lapack.dtrtri(factor.T, lower=0)[0]
             rows[:] = blas.dtrmm(1.0, inverse, rows.T, side=1, overwrite_b=1).T
     cross = right[..., :-1]

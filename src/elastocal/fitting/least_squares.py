@@ -759,7 +759,7 @@ def _list_regularising_deviations(
     model: Model, parameters: Sequence[tuple[str, Parameter]]
 ) -> list[float | None]:
     """List the standard deviations by which steps are regularised: those of the priors,
-    and the plausible sizes of frames that contacts determine.
+    and the plausible sizes of frames of which contacts may leave a turn open.
 
     Two sockets do not show a turn about the line through them. A frame is at zero before
     each step, so that this damping, Levenberg's, changes no result [1]_.
@@ -769,13 +769,14 @@ def _list_regularising_deviations(
     .. [1] Levenberg, A method for the solution of certain non-linear problems in least
        squares, Quarterly of Applied Mathematics 2, 1944.
     """
-    has_contacts = model.measuring is not None and model.rows > 1
-    return [
-        parameter.plausible
-        if has_contacts and parameter.prior_std is None and owner.startswith("frame ")
-        else parameter.prior_std
-        for owner, parameter in parameters
-    ]
+    may_have_sockets = model.measuring is not None and model.rows > 1
+    deviations = []
+    for owner, parameter in parameters:
+        std = parameter.prior_std
+        if std is None and may_have_sockets and owner.startswith("frame "):
+            std = parameter.plausible
+        deviations.append(std)
+    return deviations
 
 
 def compute_negative_compliances(fitted: Fit) -> np.ndarray:
