@@ -1,6 +1,7 @@
 """Campaigns of several kinds are fitted as one, with the noise of each kind."""
 
 import numpy as np
+import pytest
 from contact_campaigns import (
     TOOL_M,
     build_contact_case,
@@ -22,6 +23,7 @@ from elastocal.fitting.least_squares import fit_model, register_placement
 from elastocal.fitting.linearization import linearize_residual
 from elastocal.fitting.model import apply_step, list_parameters
 from elastocal.fitting.noise import Noise
+from elastocal.fitting.normal_equations import LeastSquaresProblem
 from elastocal.fitting.observations import select_states
 from elastocal.measuring.channels import parse_measuring
 from elastocal_proof.plant.contacts import seat_in_socket, touch_plane
@@ -142,6 +144,42 @@ def test_a_turn_about_the_line_through_two_sockets_is_left_alone(tmp_path):
         turn = np.concatenate([np.cross(middle, line), line])
         columns = slice(6 * session, 6 * session + 6)
         np.testing.assert_allclose(sensitivities[..., columns] @ turn, 0.0, atol=1e-9)
+
+
+def test_the_gradient_of_frames_is_that_of_the_squares_where_a_stand_has_crept(
+    tmp_path,
+):
+    """The coordinates of the base turn it about its displaced origin, and the frame
+    turns the displacement as well."""
+    features = {
+        "socket0": {"position_m": [0, 0, 0], "std_m": 0},
+        "socket1": {"position_m": [0, 0.05, 0], "std_m": [0, 1e-4, 0]},
+    }
+    case = hold_in_two_sockets(tmp_path / "cell", features)
+    model = case.model.with_effects([case.candidates["stand_creep[session 1]"]])
+    start = register_placement(model, case.observations)
+    draws = np.random.default_rng(1)
+    start.coefficients[-1][:] = 5e-3 * draws.standard_normal(
+        len(start.coefficients[-1])
+    )
+    noise = Noise("declared", 1e-4, 1e-4, np.zeros(6))
+    count = len(list_parameters(model, start))
+    problem = LeastSquaresProblem(
+        model, case.observations, noise, start, np.ones(count)
+    )
+    problem.linearize(start)
+    problem.whiten()
+    weights = np.ones(len(case.observations))
+    _, gradient = problem.normal_equations(weights)
+    size = 1e-7
+    for step, slope in zip(size * np.eye(count)[:12], gradient, strict=False):
+        above, below = (
+            problem.squares(weights, apply_step(model, start, sign * step))
+            for sign in (1.0, -1.0)
+        )
+        assert (below - above) / (4.0 * size) == pytest.approx(
+            slope, abs=1e-5 * np.abs(gradient[:12]).max()
+        )
 
 
 def test_a_feature_that_no_row_of_a_sample_touches_has_finite_values(tmp_path):

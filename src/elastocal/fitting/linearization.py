@@ -315,8 +315,10 @@ def linearize_residual(
     """Linearize a model and the axes of its residual; arguments as of `linearize`.
 
     Residuals are in base axes, which turn with the frame of their session: a residual
-    r turns back by r x w if the frame turns by w. The difference matters where frames
-    are hardly determined, such as by two sockets in each session.
+    r turns back by r x w if the frame turns by w. The frame turns the displacement d of
+    the base as well, by w x d, whereas the coordinates of the base turn it about its
+    displaced origin. Both matter where frames are hardly determined, such as by two
+    sockets in each session.
     """
     conditions = update_springs_and_masses(model, estimate, conditions)
     by_coordinates = linearize_coordinates(model, estimate, observations, conditions)
@@ -324,10 +326,12 @@ def linearize_residual(
     # Single numbers have no axes.
     if model.has_frame_parameters and model.rows > 1:
         columns = by_coordinates.columns
-        residual = by_coordinates.residual
-        turned = -form_cross_matrices(residual.reshape(-1, 3))
+        vectors = by_coordinates.residual.copy()
+        displacement = by_coordinates.coordinates[:, model.sites.base[:3]]
+        vectors[:, :3] += displacement[observations.state]
+        turned = -form_cross_matrices(vectors.reshape(-1, 3))
         jacobian = np.concatenate(
-            [columns.jacobian, turned.reshape(*residual.shape, 3)], axis=2
+            [columns.jacobian, turned.reshape(*vectors.shape, 3)], axis=2
         )
         by_coordinates = replace(
             by_coordinates, columns=replace(columns, jacobian=jacobian)
