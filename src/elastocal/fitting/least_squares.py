@@ -401,12 +401,14 @@ class ParameterTraits:
         Parameters of effects that load the robot or depend on its loads. Given these
         and the shapes, the residual is nearly linear in all other parameters.
     frozen : (P,) bool array, parameters that must not move
+    damped : (P,) bool array, see `_find_damped_parameters`
     """
 
     scales: ParameterScales
     bounds: np.ndarray
     load_coupled: np.ndarray
     frozen: np.ndarray
+    damped: np.ndarray
 
     @classmethod
     def of(
@@ -414,9 +416,11 @@ class ParameterTraits:
     ) -> ParameterTraits:
         """Collect the traits of the parameters of a model; by default none is frozen."""
         parameters = list_parameters(model, estimate)
+        damped = _find_damped_parameters(model, parameters)
+        plausible = get_plausible_sizes(model, estimate)
         penalty = [
-            0.0 if std is None else std**-2
-            for std in _list_regularising_deviations(model, parameters)
+            0.0 if parameter.prior_std is None else parameter.prior_std**-2
+            for _, parameter in parameters
         ]
         coupled_effects = {
             effect.key
@@ -424,8 +428,8 @@ class ParameterTraits:
             if effect.effect == "joint_compliance" or "load" in effect.needs
         }
         scales = ParameterScales(
-            get_plausible_sizes(model, estimate),
-            np.array(penalty),
+            plausible,
+            np.where(damped, plausible**-2, penalty),
             find_nonlinear_parameters(model, estimate),
         )
         return cls(
@@ -433,6 +437,7 @@ class ParameterTraits:
             get_parameter_bounds(model, estimate),
             np.array([owner in coupled_effects for owner, _ in parameters], bool),
             np.zeros(len(parameters), bool) if frozen is None else frozen,
+            damped,
         )
 
     def solve(
@@ -634,6 +639,9 @@ class GaussNewtonStep:
         `_REUSE_THRESHOLD`."""
         if self.solution.beyond_bound is not None:
             return False
+        # The line about which a base can turn freely moves with each step.
+        if self.traits.damped.any():
+            return False
         moving_shapes = self.traits.scales.nonlinear & ~self.solution.unidentifiable
         limit = np.where(moving_shapes, 0.0, self._standard_errors(_REUSE_THRESHOLD))
         return bool((np.abs(self.step) <= limit).all())
@@ -755,14 +763,14 @@ class ArmijoLineSearch:
         return self.traits.solve(gram, gradient, present, frozen).step
 
 
-def _list_regularising_deviations(
+def _find_damped_parameters(
     model: Model, parameters: Sequence[tuple[str, Parameter]]
-) -> list[float | None]:
-    """List the standard deviations by which steps are regularised: those of the priors,
-    and the plausible sizes of frames of which contacts may leave a turn open.
+) -> np.ndarray:
+    """Find the components of frames of which contacts may leave a turn open, (P,) bool.
 
-    Two sockets do not show a turn about the line through them. A frame is at zero before
-    each step, so that this damping, Levenberg's, changes no result [1]_.
+    Two sockets do not show a turn about the line through them. So such a frame has a
+    penalty of its plausible size. It is at zero before each step, so that this damping,
+    Levenberg's, changes no result [1]_.
 
     References
     ----------
@@ -770,13 +778,11 @@ def _list_regularising_deviations(
        squares, Quarterly of Applied Mathematics 2, 1944.
     """
     may_have_sockets = model.measuring is not None and model.rows > 1
-    deviations = []
-    for owner, parameter in parameters:
-        std = parameter.prior_std
-        if std is None and may_have_sockets and owner.startswith("frame "):
-            std = parameter.plausible
-        deviations.append(std)
-    return deviations
+    is_free_frame = [
+        owner.startswith("frame ") and parameter.prior_std is None
+        for owner, parameter in parameters
+    ]
+    return np.array(is_free_frame, bool) & may_have_sockets
 
 
 def compute_negative_compliances(fitted: Fit) -> np.ndarray:
