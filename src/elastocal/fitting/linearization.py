@@ -330,11 +330,17 @@ def linearize_residual(
         displacement = by_coordinates.coordinates[:, model.sites.base[:3]]
         vectors[:, :3] += displacement[observations.state]
         turned = -form_cross_matrices(vectors.reshape(-1, 3))
+        # The result is contiguous along the observations, as what it extends.
         jacobian = np.concatenate(
-            [columns.jacobian, turned.reshape(*vectors.shape, 3)], axis=2
+            [
+                np.moveaxis(columns.jacobian, 0, -1),
+                np.moveaxis(turned.reshape(*vectors.shape, 3), 0, -1),
+            ],
+            axis=1,
         )
         by_coordinates = replace(
-            by_coordinates, columns=replace(columns, jacobian=jacobian)
+            by_coordinates,
+            columns=replace(columns, jacobian=np.moveaxis(jacobian, -1, 0)),
         )
         first = columns.jacobian.shape[2]
         turns = dict(zip(model.sites.base[3:], range(first, first + 3), strict=True))
