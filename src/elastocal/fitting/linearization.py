@@ -314,17 +314,19 @@ def linearize_residual(
 ) -> LinearModel:
     """Linearize a model and the axes of its residual; arguments as of `linearize`.
 
-    Residuals are in base axes, which turn with the frame of their session: a residual
-    r turns back by r x w if the frame turns by w. The frame turns the displacement d of
-    the base as well, by w x d, whereas the coordinates of the base turn it about its
-    displaced origin. Both matter where frames are hardly determined, such as by two
-    sockets in each session.
+    Residuals are in base axes, which turn with the frame of their session. The errors
+    of an instrument keep the axes of the session. Those of contacts are errors of the
+    joints, which turn with the base: a residual r turns back by r x w if the frame
+    turns by w. The frame turns the displacement d of the base as well, by w x d, whereas
+    the coordinates of the base turn it about its displaced origin. Both matter where
+    frames are hardly determined, such as by two sockets in each session.
     """
     conditions = update_springs_and_masses(model, estimate, conditions)
     by_coordinates = linearize_coordinates(model, estimate, observations, conditions)
     turns: dict[int, int] = {}
     # Single numbers have no axes.
-    if model.has_frame_parameters and model.rows > 1:
+    has_vectors = model.measuring is not None and model.rows > 1
+    if has_vectors and model.has_frame_parameters:
         columns = by_coordinates.columns
         vectors = by_coordinates.residual.copy()
         displacement = by_coordinates.coordinates[:, model.sites.base[:3]]

@@ -456,6 +456,7 @@ class LeastSquaresProblem:
 
     def whiten(self) -> None:
         """Evaluate loads and whitening at the present estimate."""
+        self.whitened_at = self.estimate
         for block in self.blocks:
             if block.linear_model is not None:
                 block.conditions = block.linear_model.conditions
@@ -547,6 +548,18 @@ class LeastSquaresProblem:
             residual = self.residual
         else:
             residual = self._compute_residual(estimate)
+        # The errors of an instrument keep the axes of its session, so turn the residual
+        # into the base axes of the estimate at which the whitening was computed.
+        if self.model.measuring is None:
+            turn = (
+                self.whitened_at.frame_rotation.transpose(0, 2, 1)
+                @ estimate.frame_rotation
+            )
+            if (turn != np.eye(3)).any():
+                session = estimate.index_sessions(self.observations)
+                vectors = residual.reshape(len(residual), -1, 3)
+                turned = vectors @ turn[session].transpose(0, 2, 1)
+                residual = turned.reshape(residual.shape)
         weighted = self._whiten(residual * np.sqrt(weights)[:, None])
         squares = float((weighted**2).sum())
         if self.strains is None:
