@@ -44,6 +44,8 @@ LOCAL_EFFECTS = (*CATALOGUE_EFFECTS, "compensator_end", "stretched_poses")
 # Effects that act everywhere, beside which rows are wrong; None: no effect.
 ORDINARY_EFFECTS = (None, "joint_tilt", "base_compliance", "transmission_ratio")
 SLIPS = ("lost_beam", "held_point", "mistyped_angle", "swapped_rows", "unit")
+# Range of the share of wrong rows of a campaign.
+WRONG_SHARES = (0.01, 0.05)
 # Range of the size of an effect, in plausible sizes.
 SMALLEST_TIMES = 1.0
 LARGEST_TIMES = 10.0
@@ -304,7 +306,7 @@ if __name__ == "__main__":
         "--wrong",
         type=float,
         nargs=2,
-        default=(0.01, 0.05),
+        default=WRONG_SHARES,
         help="lowest and highest share of wrong rows",
     )
     asked = parser.parse_args()

@@ -28,6 +28,12 @@ from elastocal.fitting.observations import select_states
 from elastocal.measuring.channels import parse_measuring
 from elastocal_proof.plant.contacts import seat_in_socket, touch_plane
 
+# Two sockets whose distance is printed, along y of their session.
+PRINTED_SOCKETS = {
+    "socket0": {"position_m": [0, 0, 0], "std_m": 0},
+    "socket1": {"position_m": [0, 0.05, 0], "std_m": [0, 1e-4, 0]},
+}
+
 
 def test_exact_unknowns_are_not_fitted_and_others_have_their_priors():
     features = {
@@ -123,11 +129,7 @@ def test_a_turn_about_the_line_through_two_sockets_is_left_alone(tmp_path):
     """No measurement shows it. If axes of the residual were fixed while the base turns,
     joint errors that poses have in common would seem to show it, and the fit would turn
     the base in each step."""
-    features = {
-        "socket0": {"position_m": [0, 0, 0], "std_m": 0},
-        "socket1": {"position_m": [0, 0.05, 0], "std_m": [0, 1e-4, 0]},
-    }
-    case = hold_in_two_sockets(tmp_path / "cell", features)
+    case = hold_in_two_sockets(tmp_path / "cell", PRINTED_SOCKETS)
     noise = Noise("declared", 1e-4, 1e-4, np.zeros(6), pose_rad=3e-4)
     fitted = fit_model(case.model, case.observations, noise)
     assert fitted.converged
@@ -151,11 +153,7 @@ def test_the_gradient_of_frames_is_that_of_the_squares_where_a_stand_has_crept(
 ):
     """The coordinates of the base turn it about its displaced origin, and the frame
     turns the displacement as well."""
-    features = {
-        "socket0": {"position_m": [0, 0, 0], "std_m": 0},
-        "socket1": {"position_m": [0, 0.05, 0], "std_m": [0, 1e-4, 0]},
-    }
-    case = hold_in_two_sockets(tmp_path / "cell", features)
+    case = hold_in_two_sockets(tmp_path / "cell", PRINTED_SOCKETS)
     model = case.model.with_effects([case.candidates["stand_creep[session 1]"]])
     start = register_placement(model, case.observations)
     draws = np.random.default_rng(1)

@@ -777,12 +777,11 @@ def _find_damped_parameters(
     .. [1] Levenberg, A method for the solution of certain non-linear problems in least
        squares, Quarterly of Applied Mathematics 2, 1944.
     """
-    may_have_sockets = model.measuring is not None and model.rows > 1
     is_free_frame = [
         owner.startswith("frame ") and parameter.prior_std is None
         for owner, parameter in parameters
     ]
-    return np.array(is_free_frame, bool) & may_have_sockets
+    return np.array(is_free_frame, bool) & model.has_contact_vectors
 
 
 def compute_negative_compliances(fitted: Fit) -> np.ndarray:

@@ -324,31 +324,35 @@ def linearize_residual(
     conditions = update_springs_and_masses(model, estimate, conditions)
     by_coordinates = linearize_coordinates(model, estimate, observations, conditions)
     turns: dict[int, int] = {}
-    # Single numbers have no axes.
-    has_vectors = model.measuring is not None and model.rows > 1
-    if has_vectors and model.has_frame_parameters:
-        columns = by_coordinates.columns
-        vectors = by_coordinates.residual.copy()
-        displacement = by_coordinates.coordinates[:, model.sites.base[:3]]
-        vectors[:, :3] += displacement[observations.state]
-        turned = -form_cross_matrices(vectors.reshape(-1, 3))
-        # The result is contiguous along the observations, as what it extends.
-        jacobian = np.concatenate(
-            [
-                np.moveaxis(columns.jacobian, 0, -1),
-                np.moveaxis(turned.reshape(*vectors.shape, 3), 0, -1),
-            ],
-            axis=1,
-        )
-        by_coordinates = replace(
-            by_coordinates,
-            columns=replace(columns, jacobian=np.moveaxis(jacobian, -1, 0)),
-        )
-        first = columns.jacobian.shape[2]
+    if model.has_contact_vectors and model.has_frame_parameters:
+        first = by_coordinates.columns.jacobian.shape[2]
         turns = dict(zip(model.sites.base[3:], range(first, first + 3), strict=True))
+        by_coordinates = _append_turns(by_coordinates, model.sites.base[:3])
     return _differentiate(
         model, estimate, observations, conditions, by_coordinates, turns
     )
+
+
+def _append_turns(
+    by_coordinates: LinearModel, shift_coordinates: Sequence[int]
+) -> LinearModel:
+    """Append three coordinates that turn the axes of the residual; the coordinates that
+    shift the base are given."""
+    columns = by_coordinates.columns
+    vectors = by_coordinates.residual.copy()
+    displacement = by_coordinates.coordinates[:, shift_coordinates]
+    vectors[:, :3] += displacement[columns.state]
+    turned = -form_cross_matrices(vectors.reshape(-1, 3))
+    # The result is contiguous along the observations, as what it extends.
+    jacobian = np.concatenate(
+        [
+            np.moveaxis(columns.jacobian, 0, -1),
+            np.moveaxis(turned.reshape(*vectors.shape, 3), 0, -1),
+        ],
+        axis=1,
+    )
+    extended = replace(columns, jacobian=np.moveaxis(jacobian, -1, 0))
+    return replace(by_coordinates, columns=extended)
 
 
 def _differentiate(
@@ -371,25 +375,40 @@ def _differentiate(
     if model.has_frame_parameters:
         for session in estimate.sessions:
             in_session = (states.session == session).astype(float)
-            for coordinate in model.sites.base:
-                functions = {coordinate: in_session}
-                if coordinate in turns:
-                    functions[turns[coordinate]] = in_session
-                basis.append(functions)
+            basis += _move_frame(model.sites.base, in_session, turns)
     unknown_coordinates = range(
         model.sites.chain.coordinates, jacobian.shape[2] - len(turns)
     )
     basis += [{coordinate: np.ones(len(states))} for coordinate in unknown_coordinates]
+    basis += _move_effects(model, estimate, conditions)
+    columns = FactoredSensitivities.of(basis, jacobian, observations.state, len(states))
+    return replace(by_coordinates, columns=columns)
+
+
+def _move_frame(
+    base: Sequence[int], in_session: np.ndarray, turns: Mapping[int, int]
+) -> Iterator[dict[int, np.ndarray]]:
+    """Displacements by each component of the frame of one session; `turns` as of
+    `_differentiate`."""
+    for coordinate in base:
+        functions = {coordinate: in_session}
+        if coordinate in turns:
+            functions[turns[coordinate]] = in_session
+        yield functions
+
+
+def _move_effects(
+    model: Model, estimate: Estimate, conditions: Conditions
+) -> Iterator[dict[int, np.ndarray]]:
+    """Displacements by each linear parameter and each shape of the effects."""
     for effect, values, shapes in zip(
         model.effects, estimate.coefficients, estimate.shapes, strict=True
     ):
         if effect.effect in LOAD_EFFECTS:
-            basis += _load_effect_basis(effect, model, estimate, conditions)
+            yield from _load_effect_basis(effect, model, estimate, conditions)
         else:
-            basis += evaluate_basis_functions(effect, shapes, conditions)
-        basis += _shape_derivatives(effect, values, shapes, conditions)
-    columns = FactoredSensitivities.of(basis, jacobian, observations.state, len(states))
-    return replace(by_coordinates, columns=columns)
+            yield from evaluate_basis_functions(effect, shapes, conditions)
+        yield from _shape_derivatives(effect, values, shapes, conditions)
 
 
 def linearize_coordinates(

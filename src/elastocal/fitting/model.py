@@ -142,6 +142,12 @@ class Model:
         return self.fitted_frames or self.base_std_m > 0.0
 
     @property
+    def has_contact_vectors(self) -> bool:
+        """Whether residuals are vectors of a measuring plan, such as from a ball to its
+        socket, rather than vectors of a tracker or single numbers."""
+        return self.measuring is not None and self.rows > 1
+
+    @property
     def identifies_compliance(self) -> bool:
         """Whether the joint compliances are parameters."""
         return any(effect.effect == "joint_compliance" for effect in self.effects)
