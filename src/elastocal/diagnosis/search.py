@@ -441,21 +441,23 @@ class BeamSearch:
         by_scale : (number of open terms, S), log evidence with each of these added
         """
         terms = self.problem.terms
-        prior = self.problem.prior
         # The model's own scales count as fixed here, as they are not averaged over. The
         # difference is the same for all extensions.
-        offset = self.log_odds[model] - log_evidence
-        gains = (log_sum_exp(by_scale, axis=1) + offset).tolist()
+        gains = log_sum_exp(by_scale, axis=1) + (self.log_odds[model] - log_evidence)
         best_scales = self.problem.grid.scales[by_scale.argmax(axis=1)].tolist()
         first_location = self.single_term_log_prior[open_terms].tolist()
         locations = Counter(terms[n].mechanism for n in model)
         scales = self.scales[model]
         for number, gain, best_scale, log_prior in zip(
-            open_terms.tolist(), gains, best_scales, first_location, strict=True
+            open_terms.tolist(),
+            gains.tolist(),
+            best_scales,
+            first_location,
+            strict=True,
         ):
             count = locations.get(terms[number].mechanism)
             if count:
-                log_prior = prior.log_odds_change(terms[number], count)
+                log_prior = self.problem.prior.log_odds_change(terms[number], count)
             index = bisect(model, number)
             larger = (*model[:index], number, *model[index:])
             log_odds = gain + log_prior
