@@ -13,6 +13,7 @@ from elastocal.diagnosis.model_averaging import (
     ModelAverage,
     allow_for_laws,
     average_models,
+    compute_between_model_squares,
     compute_explained_squares,
     compute_extra_squares,
     is_expected_to_help,
@@ -231,6 +232,17 @@ def test_a_model_is_expected_to_help_if_it_lowers_the_expected_squared_error(
 
     helps = expect_squared_error(modes[0]) < expect_squared_error(np.zeros(len(gram)))
     assert is_expected_to_help(problem, posterior, posterior.models[0]) == helps
+
+
+def test_squares_between_models_are_not_negative_by_rounding(rows_and_design):
+    problem = rows_and_design[1].problem
+    posterior = make_posterior(((0,), [0.3], 0.0, 0.6), ((0, 1), [0.3] * 2, 0.0, 0.4))
+    gram = problem.statistics.gram
+    rounded = replace(problem.statistics, gram=gram * -1e-16)
+    squares = compute_between_model_squares(
+        replace(problem, statistics=rounded), posterior, posterior.models[0]
+    )
+    assert squares == 0.0
 
 
 def test_the_extra_sum_of_squares_is_the_least_penalised_sum_that_the_other_terms_leave(

@@ -240,7 +240,14 @@ def turned_force(axis, force):
 def warmth(arm, law, *lag):
     if "temperature" in law.detail:
         return arm.states.temperature_c - 20.0
-    return 1.0 - np.exp(-arm.states.time_s / lag[0])
+    elapsed = share_before(arm) if "order" in law.detail else arm.states.time_s
+    return 1.0 - np.exp(-elapsed / lag[0])
+
+
+def share_before(arm):
+    """Share of the campaign before each row."""
+    row = arm.states.row
+    return (row - row.min()) / (row.max() - row.min())
 
 
 def temperature_gradient(arm, law, name, *lag):
@@ -277,8 +284,12 @@ def at_the_foot(amount):
 
 
 def after_row(arm, when):
-    row = arm.states.row
-    return ((row - row.min()) / (row.max() - row.min()) >= when).astype(float)
+    return (share_before(arm) >= when).astype(float)
+
+
+def frame_drift(arm, law, name):
+    elapsed = share_before(arm) if law.detail == "order" else arm.states.time_s / 3600.0
+    return at_the_foot(lambda arm: elapsed)(arm, law, name)
 
 
 CLOSED_FORMS = {
@@ -334,7 +345,7 @@ CLOSED_FORMS = {
     "thermal_growth": lambda arm, law, name, *lag: grown(arm, warmth(arm, law, *lag)),
     "temperature_gradient": temperature_gradient,
     "base_placement": at_the_foot(lambda arm: 1.0),
-    "frame_drift": at_the_foot(lambda arm: arm.states.time_s / 3600.0),
+    "frame_drift": frame_drift,
     "setup_step": at_the_foot(after_row),
 }
 

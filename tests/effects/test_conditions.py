@@ -34,3 +34,13 @@ def test_time_and_temperature_are_offered_if_they_change(kuka, column, name):
         sites, replace(states, **{column: np.full(5, 20.0)})
     )
     assert name not in find_offered_needs(sites, replace(states, **{column: None}))
+
+
+def test_the_order_of_the_rows_is_offered_only_without_times(kuka):
+    sites = build_sites(kuka)
+    states = replace(make_states(6, 5, seed=1), time_s=None)
+    assert "order" in find_offered_needs(sites, states)
+    timed = replace(states, time_s=np.arange(5.0))
+    assert "order" not in find_offered_needs(sites, timed)
+    single = replace(states, row=np.ones(5, int))
+    assert "order" not in find_offered_needs(sites, single)

@@ -72,8 +72,8 @@ _CHUNK = 200
 # reuse those of the last one for other robots, because drawing takes most of the time of
 # a long path. No robot gets the same number twice.
 _DRAWN_CHUNKS = 5
-# Upper bound on the states over which the accuracy of a campaign is stated; more states
-# do not change a printed digit.
+# Upper bound on the states over which the accuracy of a campaign is stated, and that of
+# held-out poses predicted; more states do not change a printed digit.
 _MOST_STATES = 1000
 
 
@@ -556,10 +556,15 @@ def select_campaign_commands(
     """Select commands (N, n) and loads (N, 6) of the campaign over which its accuracy is
     stated: all, or evenly spaced ones of a very large campaign."""
     states = calibrated.states
-    count = min(len(states), _MOST_STATES)
-    chosen = np.unique(np.linspace(0, len(states) - 1, count).astype(int))
+    chosen = _select_evenly(len(states))
     commands = calibrated.robot.reported_angles(states.joint_angles[chosen])
     return commands, states.wrench[chosen]
+
+
+def _select_evenly(count: int) -> np.ndarray:
+    """Select the indices of all of a number of states, or of `_MOST_STATES` that are
+    evenly spaced."""
+    return np.unique(np.linspace(0, count - 1, min(count, _MOST_STATES)).astype(int))
 
 
 def predict_campaign_accuracy(calibrated: CalibratedRobot) -> Accuracy:
@@ -575,8 +580,9 @@ def inflate_to_held_out_errors(
     """Raise the predicted errors of a robot if its held-out poses contradict them.
 
     The test statistic is the mean squared residual of the targets at the end effector.
-    It is compared with those of simulated robots and simulated noise. The excess counts
-    as error of the model's form. Nothing changes if the noise is unknown.
+    It is compared with those of simulated robots, of a very large campaign at evenly
+    spaced poses, and of simulated noise. The excess counts as error of the model's form.
+    Nothing changes if the noise is unknown.
 
     Parameters
     ----------
@@ -593,18 +599,29 @@ def inflate_to_held_out_errors(
     if calibrated.noise.source == "residual" or not tested.any():
         return calibrated
     state = observations.state[tested]
-    commands = calibrated.robot.reported_angles(states.joint_angles)
-    predicted = predict_errors(_with_all_effects(calibrated), commands, states.wrench)
+    tested_states = np.unique(state)
+    chosen = tested_states[_select_evenly(len(tested_states))]
+    commands = calibrated.robot.reported_angles(states.joint_angles[chosen])
+    predicted = predict_errors(
+        _with_all_effects(calibrated), commands, states.wrench[chosen]
+    )
     sensor_variance = noise_m**2 / states.repeats[state]
-    stream = np.random.default_rng(_SEED)
-    chi_squares = stream.chisquare(3, (len(state), len(predicted.rms_m)))
-    drawn_noise = sensor_variance @ chi_squares / len(state)
+    drawn_noise = _draw_mean_squares(sensor_variance, len(predicted.rms_m))
     mean_square = float((residual[tested] ** 2).sum(axis=1).mean())
     if (predicted.rms_m**2 + drawn_noise < mean_square).mean() <= CONFIDENCE:
         return calibrated
-    explained = (predicted.error_m[state] ** 2 - predicted.form_m[state] ** 2).mean()
+    explained = (predicted.error_m**2 - predicted.form_m**2).mean()
     excess = mean_square - 3.0 * sensor_variance.mean() - explained
     return set_form_error(calibrated, float(np.sqrt(excess)), contradicted=True)
+
+
+def _draw_mean_squares(variance: np.ndarray, draws: int) -> np.ndarray:
+    """Draw mean squared lengths (draws,) of normal vectors with these variances (M,) of a
+    coordinate. The squares of vectors with one variance are drawn as one sum."""
+    stream = np.random.default_rng(_SEED)
+    variances, count = np.unique(variance, return_counts=True)
+    chi_squares = stream.chisquare(3 * count[:, None], (len(variances), draws))
+    return np.asarray(variances @ chi_squares / len(variance))
 
 
 def _with_all_effects(calibrated: CalibratedRobot) -> CalibratedRobot:

@@ -256,7 +256,9 @@ def compute_between_model_squares(
     for likely_model, probability in _select_likely_models(posterior, model):
         difference = _compute_coefficients(problem, likely_model) - coefficients
         squares += probability * (difference @ gram @ difference)
-    return float(squares)
+    # The Gram matrix has eigenvalues that are negative by rounding. Without this bound,
+    # equal models would have a root mean square that is not a number.
+    return max(float(squares), 0.0)
 
 
 def compute_explained_squares(

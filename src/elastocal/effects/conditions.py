@@ -403,7 +403,7 @@ def find_offered_needs(sites: Sites, states: States) -> frozenset[str]:
     "load" for an external load or a weight; "load on the joints" for an external load
     or declared masses; "external load", without which the compliances are not
     identifiable; "approach" if it is known in some state; "time" and "temperature" if
-    they change.
+    they change; "order", that of the rows, if the times do not.
     """
     external = bool(states.wrench.any())
     loaded = bool(sites.masses) or external
@@ -418,6 +418,7 @@ def find_offered_needs(sites: Sites, states: States) -> frozenset[str]:
         "external load": external,
         "approach": has_approach,
         "time": has_time,
+        "order": not has_time and bool(np.diff(compute_progress(states)).any()),
         "temperature": has_temperature,
     }
     return frozenset(need for need, present in is_offered.items() if present)

@@ -44,8 +44,19 @@ _GRADIENT_WORDS = {
     "column ": "across the column",
 }
 # Shapes of a thermal law, by its cause. The castings of a robot follow their motors and
-# the air within a quarter of an hour to some hours.
-CAUSES = {"temperature": (), "time": (Shape("lag", "s", 3600.0, 900.0, 36000.0),)}
+# the air within a quarter of an hour to some hours. In the order of the rows these are
+# shares of a campaign of two hours.
+CAUSES = {
+    "temperature": (),
+    "time": (Shape("lag", "s", 3600.0, 900.0, 36000.0),),
+    "order": (Shape("lag", "1", 0.5, 0.125, 5.0),),
+}
+# What the causes are called.
+_CAUSE_WORDS = {
+    "temperature": "by temperature",
+    "time": "by time",
+    "order": "by the order of the rows",
+}
 
 
 @_effect(
@@ -243,26 +254,40 @@ def scale_displacements(
     "drift of the tracker or the robot base",
     Size("shift an hour", 2e-4, "a tripod on a warming floor"),
     Size("turn an hour", 1e-4, "the same over the height of the stand"),
+    Size("shift", 4e-4, "the same, in a campaign of two hours"),
+    Size("turn", 2e-4, "the same over the height of the stand"),
+    at=lambda sites: [("time", " an hour", "/h"), ("order", "", "")],
     moves_robot=False,
-    formula=r"u = t \begin{pmatrix} d \\ r \end{pmatrix}",
+    detail_words=_CAUSE_WORDS,
+    formula=(
+        r"u = t \begin{pmatrix} d \\ r \end{pmatrix} \text{, or } u = w "
+        r"\begin{pmatrix} d \\ r \end{pmatrix} \text{ after the share } w "
+        r"\text{ of the campaign}"
+    ),
 )
-def frame_drift(entry: Effect, sites: Sites) -> Candidates:
+def frame_drift(
+    entry: Effect, sites: Sites, clock: str, per: str, unit: str
+) -> Candidates:
     """A tracker or a robot base that drifts: stand, floor or bolts settle, and all
     measurements move as one rigid body.
 
     u = t (d, r) at the foot in base axes, with t the time since the first measurement
-    (h), d in m/h and r in rad/h; a point p (m) moves by t (d + r x p).
+    (h), d in m/h and r in rad/h; a point p (m) moves by t (d + r x p). If the times are
+    unknown, the share w of the campaign before the row takes the place of t, d is in m
+    and r in rad: the rows are then assumed to follow each other at an even pace.
     """
     six = moved_and_turned(
-        entry.size("shift an hour", sites), entry.size("turn an hour", sites), "/h"
+        entry.size(f"shift{per}", sites), entry.size(f"turn{per}", sites), unit
     )
-    yield entry.candidate(
-        (),
-        six,
-        lambda conditions: [{c: conditions.time_s / _HOUR_S} for c in sites.base],
-        {"time"},
-        of_setup=True,
-    )
+
+    def law(conditions: Conditions) -> Displacements:
+        elapsed = conditions.progress
+        if clock == "time":
+            elapsed = conditions.time_s / _HOUR_S
+        return [{coordinate: elapsed} for coordinate in sites.base]
+
+    detail = "" if clock == "time" else clock
+    yield entry.candidate((), six, law, {clock}, detail=detail, of_setup=True)
 
 
 # Tasks refer to the base as it stands, as for a drift.
@@ -297,12 +322,20 @@ def setup_step(entry: Effect, sites: Sites) -> Candidates:
     yield entry.candidate((), six, law, shapes=(_WHEN,), of_setup=True)
 
 
-def compute_warming(conditions: Conditions, *lag: float) -> np.ndarray:
-    """Compute how much the robot has warmed, ndarray (S,): from the time as a share of the
-    final rise if a lag (s) is given, otherwise from the temperature, K."""
-    if lag:
-        return -np.expm1(-conditions.time_s / lag[0])
-    return conditions.temperature_c - _REFERENCE_C
+def compute_warming(conditions: Conditions, cause: str, *lag: float) -> np.ndarray:
+    """Compute how much the robot has warmed, ndarray (S,): K above the temperature at which
+    dimensions are stated, or a share of the final rise.
+
+    Parameters
+    ----------
+    conditions : of S states.
+    cause : key of `CAUSES`.
+    lag : time constant in s, or as a share of the campaign; none for the temperature.
+    """
+    if cause == "temperature":
+        return conditions.temperature_c - _REFERENCE_C
+    elapsed = conditions.time_s if cause == "time" else conditions.progress
+    return -np.expm1(-elapsed / lag[0])
 
 
 @_drift(
@@ -312,7 +345,9 @@ def compute_warming(conditions: Conditions, *lag: float) -> np.ndarray:
     at=lambda sites: [
         ("temperature", "expansion", "1/K"),
         ("time", "final growth", "m/m"),
+        ("order", "final growth", "m/m"),
     ],
+    detail_words=_CAUSE_WORDS,
     formula=(
         r"\delta l = \alpha\, \Delta T\, l \quad \text{or} \quad \delta l = g "
         r"\left( 1 - e^{-t / t_0} \right) l"
@@ -328,13 +363,16 @@ def thermal_growth(
     expansion (1/K) and dT the temperature above 20 °C, at which dimensions are stated
     (ISO 1). If only the time t (s) is known, dl = g (1 - exp(-t / t_0)) l, with g the
     final growth (m/m) and t_0 (s) the time constant of a body of uniform temperature
-    (Incropera and DeWitt 2002).
+    (Incropera and DeWitt 2002). If the times are unknown too, both are shares of the
+    campaign, as if its rows followed each other at an even pace.
     """
     growth = entry.parameters(quantity, [quantity.replace(" ", "_")], unit, sites)
     lengthened = lengthen(sites, np.ones(sites.joints + 1))
 
     def law(conditions: Conditions, *lag: float) -> Displacements:
-        return [scale_displacements(compute_warming(conditions, *lag), lengthened)]
+        return [
+            scale_displacements(compute_warming(conditions, cause, *lag), lengthened)
+        ]
 
     yield entry.candidate((), growth, law, {cause}, shapes=CAUSES[cause], detail=cause)
 
@@ -357,9 +395,9 @@ def _gradient_places(sites: Sites) -> list[tuple[int | None, str]]:
     part="link",
     detail_words={"along": "along the arm"}
     | {
-        f"{prefix}{cause}": f"{description}, by {cause}"
+        f"{prefix}{cause}": f"{description}, {cause_words}"
         for prefix, description in _GRADIENT_WORDS.items()
-        for cause in CAUSES
+        for cause, cause_words in _CAUSE_WORDS.items()
     },
     formula=(
         r"\delta y = \tfrac{1}{2} \alpha g\, \Delta T\, l^2, \quad \delta r = "
@@ -379,16 +417,17 @@ def temperature_gradient(
     is x (m) from the base grows by the share b (x - x_0), with x_0 the mean over the arm,
     whose length stays the same. Both are proportional to the temperature above 20 °C if
     it is measured (parameters in 1/(K m)), and otherwise to a first-order lag since the
-    start of the campaign (1/m).
+    start of the campaign (1/m), by its times or else by the order of its rows.
     """
     quantity, unit = {
         "temperature": ("curvature a kelvin", "1/(K m)"),
         "time": ("curvature", "1/m"),
+        "order": ("curvature", "1/m"),
     }[cause]
     displacements = _gradient_displacements(sites, link)
 
     def law(conditions: Conditions, *lag: float) -> Displacements:
-        warming = compute_warming(conditions, *lag)
+        warming = compute_warming(conditions, cause, *lag)
         return [
             scale_displacements(warming, displacement)
             for displacement in displacements.values()

@@ -91,7 +91,7 @@ _RANGE_MARGIN = 0.05
 # deviation of a joint.
 _RAD_PER_SIZE = 1e-3
 # Conditions that no command states, named as in `effects.conditions`.
-_NOT_COMMANDED = {"approach", "time", "temperature"}
+_NOT_COMMANDED = {"approach", "time", "order", "temperature"}
 
 
 @dataclass(frozen=True)

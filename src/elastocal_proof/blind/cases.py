@@ -339,10 +339,10 @@ def _list_entries(
         yield _Entry("pair", pair, (level, level), "usual", number)
     for setting, changes in plan["settings"].items():
         repetitions = range(part.get("setting", 0))
-        hidden_effects = changes.get("hides", ())
-        for effect, number in product(hidden_effects, repetitions):
+        without_covariate = (*changes.get("in_order", ()), *changes.get("hides", ()))
+        for effect, number in product(without_covariate, repetitions):
             yield _Entry("setting", (effect,), (_HIGH,), setting, number)
-        if setting == "usual" or hidden_effects:
+        if setting == "usual" or without_covariate:
             continue
         # Without loads, many effects leave no trace in the measurements.
         with_effect = () if changes.get("without_effect") else repetitions
