@@ -1,12 +1,18 @@
 """The statement of a diagnosis agrees with the fits that it describes."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 from made_loop_tables import CAMPAIGNS
 
-from elastocal.diagnosis.training_verdict import warn_of_more_probable_causes
+from elastocal.diagnosis.training_verdict import (
+    warn_of_more_probable_causes,
+    warn_of_unknown_times,
+)
+from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.model import get_joint_compliances
+from elastocal.mechanics.sites import build_sites
 
 
 def test_compliances_before_are_those_of_the_declared_model(diagnosis):
@@ -35,3 +41,14 @@ def test_a_cause_that_is_more_probable_than_the_stated_one_is_mentioned():
     assert warning.startswith("a related mechanism (90 %) is more probable")
     sure = replace(stated, probability=0.85)
     assert warn_of_more_probable_causes([sure], mechanisms) == []
+
+
+def test_effects_of_time_that_only_the_order_of_the_rows_shows_are_warned_of(kuka):
+    candidates = candidates_on(build_sites(kuka))
+    keys = ["thermal_growth[order]", "joint_offset@2"]
+    fitted = SimpleNamespace(
+        model=SimpleNamespace(effects=[candidates[key] for key in keys])
+    )
+    (warning,) = warn_of_unknown_times(fitted, keys)
+    assert warning.startswith("times are not recorded: thermal growth of the links is")
+    assert warn_of_unknown_times(fitted, keys[1:]) == []

@@ -282,13 +282,31 @@ def _warn_of_search(
     """Return warnings of effects that are implausible, and of a search that did not
     settle."""
     keys = [key for effect in effects for key in effect.members]
-    warnings = [*warn_of_implausible_values(full_model, keys)]
+    warnings = [
+        *warn_of_implausible_values(full_model, keys),
+        *warn_of_unknown_times(full_model, keys),
+    ]
     if not evidence.settled:
         warnings.append(
             f"the problem was linearised {settings.linearizations} times, "
             "and each time another model was found: more may be missing"
         )
     return tuple(warnings)
+
+
+def warn_of_unknown_times(full_model: Fit, keys: Sequence[str]) -> list[str]:
+    """Warn of effects of time that the order of the rows alone shows."""
+    words = {
+        list_effects()[effect.effect].words
+        for effect in full_model.model.effects
+        if effect.key in keys and "order" in effect.needs
+    }
+    if not words:
+        return []
+    return [
+        f"times are not recorded: {' and '.join(sorted(words))} is what the order of the"
+        " rows shows if they followed each other at an even pace"
+    ]
 
 
 def _state_probabilities(evidence: Evidence) -> Probabilities:

@@ -59,8 +59,9 @@ _REGISTRATION_MEMORY = 6
 # Share of its prior variance above which a parameter counts as not identified: the prior
 # says more of it than the measurements do, and its value is no reason for a warning.
 IDENTIFIED_SHARE = 0.5
-# Upper bound on the Gauss-Newton steps of a fit.
-_MAX_STEPS = 30
+# Upper bound on the Gauss-Newton steps of a fit. Where the order of a wave is hardly
+# determined, a step can be 0.85 of the one before, and 50 of them reach the tolerance.
+_MAX_STEPS = 60
 # Upper bound on the halvings of a step. If a 64th of it does not lower the objective,
 # the step points in a wrong direction or along a kink.
 _MAX_HALVINGS = 6
