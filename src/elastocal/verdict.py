@@ -21,6 +21,9 @@ from elastocal.io.typed_json import (
 if TYPE_CHECKING:
     from pathlib import Path
 
+# From this probability on, an effect is more probable than not.
+_LIKELY = 0.5
+
 
 @dataclass(frozen=True)
 class Location:
@@ -113,6 +116,15 @@ class Effect:
     alternatives: tuple[str, ...]
     adopted: bool
     cost_m: float | None = None
+
+    @property
+    def is_likely(self) -> bool:
+        """Whether the effect is more probable than not.
+
+        The evidence chooses the effects of the model, and probabilities allow for laws
+        that are only nearly true, so that an effect can be in the model without it.
+        """
+        return self.probability >= _LIKELY
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,8 @@ from made_loop_tables import (
 from elastocal.diagnosis.verdict import NAMED
 from elastocal.report.loop_facts import (
     AT_FAULT,
+    TITLES,
+    UNCERTAIN_COUNT,
     describe_effect,
     format_cost,
     render_campaign_sentences,
@@ -77,6 +79,21 @@ def test_a_mechanism_is_most_probable_only_if_no_other_one_is_more_so():
     probabilities = replace(verdict.probabilities, mechanisms=mechanisms)
     said = render_campaign_sentences(replace(verdict, probabilities=probabilities))
     assert "one mechanism, possibly lost motion" in plainly(said["sentences"][0])
+
+
+def test_an_effect_that_is_less_probable_than_not_is_not_called_missing():
+    verdict = CAMPAIGNS["several"]
+    backlash, payload = verdict.effects
+    improbable = replace(payload, probability=0.14)
+    doubtful = replace(verdict, effects=(backlash, improbable))
+    sentences = plainly(" ".join(render_campaign_sentences(doubtful)["sentences"]))
+    assert "The declared model lacks 1 mechanism: lost motion" in sentences
+    assert (
+        "Less probable than not, but in the model, because it fits these measurements "
+        "better with it: weight of an undeclared payload (14 %; 0.085 mm)."
+    ) in sentences
+    assert facts_of(doubtful)["verdict"] == UNCERTAIN_COUNT
+    assert facts_of(verdict)["verdict"] == TITLES["several"]
 
 
 def test_the_advice_follows_from_the_verdict_and_the_gain():

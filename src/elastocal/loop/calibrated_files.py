@@ -283,7 +283,9 @@ def build_certificate(
         "files": campaign.folder.digests,
         "verdict": verdict.verdict,
         "repeatable": to_document(verdict.repeatable),
-        "effects": [effect.name for effect in verdict.effects],
+        "effects": [
+            effect.name for effect in verdict.missing_effects if effect.is_likely
+        ],
         "errors": tabulate_errors(verdict),
         "validation_rms_m": {
             "before": heldout.before.rms_m,

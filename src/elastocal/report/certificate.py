@@ -54,7 +54,7 @@ def collect_certificate_facts(document: Document) -> dict[str, Any]:
         document=document,
         joint_ranges=[JointRange(**limits) for limits in document["joint_ranges"]],
         accuracy_sentence=format_accuracy(Accuracy(**document["accuracy"])),
-        title=format_title(document["verdict"], document["effects"], repeatable),
+        title=format_title(document["verdict"], len(document["effects"]), repeatable),
     )
     paragraphs = {
         name: sentences if name in _LISTS else " ".join(sentences)

@@ -40,6 +40,10 @@ TITLES = {
     "unexplained": "the declared model lacks something that is not in the catalogue",
     "not_testable": "these measurements can test no mechanism",
 }
+# Verdicts that name effects.
+_NAMING = ("named", "class", "several")
+# Title of several mechanisms of which at most one is more probable than not.
+UNCERTAIN_COUNT = "mechanisms are missing in the declared model; how many is uncertain"
 AT_FAULT = "the data are at fault"
 # Appended to a title if a part of the residual is a function of the joints.
 AND_MORE = "; a further error has no known cause"
@@ -81,7 +85,7 @@ _SHOWN_LOCATIONS = 4
 
 
 def format_title(
-    verdict: str, effects: Sequence[object], repeatable: RepeatableResidual | None
+    verdict: str, likely: int, repeatable: RepeatableResidual | None
 ) -> str:
     """Return a verdict in one line; it mentions a repeatable residual.
 
@@ -89,13 +93,16 @@ def format_title(
     ----------
     verdict : str
         One of the six verdicts.
-    effects : sequence
-        Missing effects.
+    likely : int
+        Number of missing effects that are more probable than not.
     repeatable : RepeatableResidual or None
         Part of the residual that is a function of the joints.
     """
+    title = TITLES[verdict]
+    if verdict == "several" and likely < 2:
+        title = UNCERTAIN_COUNT
     remains = repeatable is not None and repeatable.remains
-    return TITLES[verdict] + (AND_MORE if effects and remains else "")
+    return title + (AND_MORE if verdict in _NAMING and remains else "")
 
 
 def render_campaign_sentences(
@@ -168,7 +175,8 @@ def collect_loop_facts(
     }
     effects = [describe_effect(effect, heldout) for effect in verdict.missing_effects]
     faults = [describe_fault(fault) for fault in verdict.faults]
-    title = format_title(verdict.verdict, verdict.effects, verdict.repeatable)
+    likely = sum(effect.is_likely for effect in verdict.missing_effects)
+    title = format_title(verdict.verdict, likely, verdict.repeatable)
     return {
         **paragraphs,
         "method": dict(stated["method"]),
@@ -301,6 +309,9 @@ def describe_effect(effect: Effect, heldout: HeldOut) -> dict[str, Any]:
     heldout : HeldOut
         Errors of the validation poses.
     """
+    found = say.format_found_effect(effect.name, effect.members)
+    probability = say.format_probability(effect.probability)
+    cost = format_cost(effect, heldout)
     identifiable = [entry for entry in effect.parameters if entry.identifiable]
     shown = _select_parameters(identifiable)
     rows = [_effect_parameter_row(entry, effect.members) for entry in shown]
@@ -318,7 +329,7 @@ def describe_effect(effect: Effect, heldout: HeldOut) -> dict[str, Any]:
         left_out = format_integer(len(identifiable))
     return {
         "name": say.capitalize_first(say.name_effect(effect.name)),
-        "found": say.format_found_effect(effect.name, effect.members),
+        "found": found,
         "bare": say.name_effect(effect.name),
         "catalogue": effect.name,
         "family": effect.family,
@@ -330,8 +341,10 @@ def describe_effect(effect: Effect, heldout: HeldOut) -> dict[str, Any]:
         "left_out": left_out,
         "with_angle": any("q)" in row[0] for row in rows),
         "held": len(effect.parameters) - len(identifiable),
-        "probability": say.format_probability(effect.probability),
-        "cost": format_cost(effect, heldout),
+        "probability": probability,
+        "is_likely": effect.is_likely,
+        "stated": f"{found} ({probability}; {cost})",
+        "cost": cost,
         "cost_m": effect.cost_m,
         "gain": effect.heldout_gain,
         "adopted": effect.adopted,
