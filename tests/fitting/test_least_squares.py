@@ -476,6 +476,7 @@ def test_a_fit_has_converged_if_its_step_is_below_a_share_of_the_standard_error(
         coefficients=(np.array([solution + share * tolerance * scale * deviation]),),
     )
     monkeypatch.setattr(f"{MODULE}._MAX_STEPS", 1)
+    monkeypatch.setattr(f"{MODULE}._NEGLIGIBLE_STEP", 0.0)
     fit = fit_model(
         model,
         observations,
@@ -493,6 +494,24 @@ def test_a_fit_has_converged_if_its_step_is_below_a_share_of_the_standard_error(
     # and that step does not count as convergence.
     unweighted = fit_model(model, observations, SENSOR, start, tolerance=tolerance)
     assert not unweighted.converged
+
+
+@pytest.mark.parametrize(("std_errors", "converged"), [(0.009, True), (0.02, False)])
+def test_a_fit_that_reaches_its_last_step_has_converged_if_that_step_is_negligible(
+    std_errors, converged, monkeypatch
+):
+    states = replace(make_gantry_states(30), repeats=np.ones(30, int))
+    model = make_gantry_model(make_linear_law(1))
+    design = evaluate_waves(states.joint_angles, 1)[..., 0]
+    deviation = 1e-4 / np.sqrt((design**2).sum())
+    start = replace(
+        make_estimate(model, size=0.0),
+        coefficients=(np.array([std_errors * deviation]),),
+    )
+    observations = observe_with_errors(states, 0.0 * design)
+    monkeypatch.setattr(f"{MODULE}._MAX_STEPS", 1)
+    fit = fit_model(model, observations, SENSOR, start, reweight_first_step=True)
+    assert fit.converged == converged
 
 
 def remove_loads(states):

@@ -59,9 +59,13 @@ _REGISTRATION_MEMORY = 6
 # Share of its prior variance above which a parameter counts as not identified: the prior
 # says more of it than the measurements do, and its value is no reason for a warning.
 IDENTIFIED_SHARE = 0.5
-# Upper bound on the Gauss-Newton steps of a fit. Where the order of a wave is hardly
-# determined, a step can be 0.85 of the one before, and 50 of them reach the tolerance.
-_MAX_STEPS = 60
+# Upper bound on the Gauss-Newton steps of a fit.
+_MAX_STEPS = 30
+# A fit that ends without the tolerance has converged all the same if its last step is
+# below this many standard errors. Where the order of a wave is hardly determined, a step
+# is 0.85 of the one before, and all further ones are less than a tenth of a standard
+# error together.
+_NEGLIGIBLE_STEP = 1e-2
 # Upper bound on the halvings of a step. If a 64th of it does not lower the objective,
 # the step points in a wrong direction or along a kink.
 _MAX_HALVINGS = 6
@@ -373,6 +377,7 @@ def fit_robustly(
         if accepted is None and iterate.stalled:
             break
         iterate = iterate.advance(step, accepted, reweighted=reweighted)
+    converged = converged or (reweighted and step.is_within(_NEGLIGIBLE_STEP))
     final = problem.finish(iterate.estimate)
     return Fit(
         model,
