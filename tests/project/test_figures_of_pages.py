@@ -154,7 +154,8 @@ def named_effects(cell):
 def stated_effects(words):
     """Names and joints of words like "gravity sag of joints 2 to 4 and payload"."""
     effects = set()
-    for entry in words.split(" and "):
+    # A comma or an "and" before a digit separates joints, before a word effects.
+    for entry in re.split(r"(?:, and|,| and) (?=[a-z])", words):
         name, _, joints = entry.partition(" of joint")
         numbers_of_joints = re.findall(r"\d", joints)
         if " to " in joints:
@@ -169,6 +170,12 @@ def test_stated_effects_are_compared_by_name_and_joint():
     sentence = "gravity sag of joints 2 to 3 and weight of an undeclared payload"
     assert stated_effects(sentence) == named_effects(cell)
     assert stated_effects("gravity sag of joint 2") != named_effects(cell)
+    longer_cell = "payload + link_weight (joint 2, 3, 5) + transmission_ratio (joint 1)"
+    longer_sentence = (
+        "gear ratio or coupling error of joint 1, gravity sag of joints 2, 3 and 5, "
+        "and weight of an undeclared payload"
+    )
+    assert stated_effects(longer_sentence) == named_effects(longer_cell)
 
 
 def read_prose(page):
