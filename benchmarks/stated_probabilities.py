@@ -29,14 +29,16 @@ CONFIG = Path(__file__).resolve().parents[1] / "config"
 MISPLACED_SETTING = "tilted_base"
 
 
-def diagnose_cases(size, count, seed, folder):
-    """Make and diagnose the first cases of a size, which are a random sample; return a
-    row of scores and the locations of each."""
+def diagnose_cases(size, count, seed, group, folder):
+    """Make and diagnose the first cases of a size, which are a random sample, or those of
+    one group among them; return a row of scores and the locations of each."""
     plan = read_document(CONFIG / "blind.yaml")
     robots = CONFIG / "robots"
     rows = []
     locations = []
     for case in list_cases(plan, size, seed)[:count]:
+        if group and case.group != group:
+            continue
         write_sealed_case(case, folder, folder / "sealed", robots)
         training, _ = read_cases((folder / case.name).as_posix(), robots.as_posix())
         verdict = diagnose(training, Settings(), seed).document
@@ -52,11 +54,16 @@ def main():
     parser.add_argument("--cases", type=int, default=180)
     parser.add_argument("--seed", type=int, default=11701)
     parser.add_argument("--size", default="development", help="of config/blind.yaml")
+    parser.add_argument("--group", help="of config/blind.yaml, such as outside")
     parser.add_argument("--save", type=Path, help="table of the cases, as Parquet")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         cases, locations = diagnose_cases(
-            arguments.size, arguments.cases, arguments.seed, Path(folder)
+            arguments.size,
+            arguments.cases,
+            arguments.seed,
+            arguments.group,
+            Path(folder),
         )
     if arguments.save:
         cases.to_parquet(arguments.save)

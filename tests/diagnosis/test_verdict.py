@@ -110,6 +110,20 @@ CONCLUSIONS = {
         {"offset": ("payload", "tilt")},
         0.99,
     ),
+    "no name below 80 % alone, although no competitor is worth a line": Expected(
+        {"0": 0.79, "2": 0.015, "3": 0.015, "4": 0.015},
+        CLASS,
+        ("offset",),
+        {"offset": (OTHER,)},
+        0.79,
+    ),
+    "a class below 80 % lists what is worth a line": Expected(
+        {"0": 0.76, "2": 0.03, "3": 0.015},
+        CLASS,
+        ("offset",),
+        {"offset": ("payload",)},
+        0.79,
+    ),
     "a related mechanism in the same model": Expected(
         {"15": 0.9, "1": 0.1}, CLASS, ("offset", OTHER), {"offset": (OTHER,)}, 1.0
     ),

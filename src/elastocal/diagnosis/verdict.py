@@ -191,7 +191,12 @@ def conclude(problem: SearchProblem, posterior: Posterior, alarm: Alarm) -> Conc
     conclusion, stated = _choose_verdict(
         hypotheses, leaders, mechanisms, problem.settings
     )
-    return _add_confounded_mechanisms(problem, posterior, conclusion, stated)
+    conclusion = _add_confounded_mechanisms(problem, posterior, conclusion, stated)
+    has_alternatives = any(conclusion.alternatives.values())
+    if conclusion.verdict == CLASS and not has_alternatives:
+        # No competitor is worth a line, but together they are too probable for a name.
+        return allow_related_mechanisms(conclusion, conclusion.best.named)
+    return conclusion
 
 
 def _choose_leaders(
@@ -254,10 +259,10 @@ def _choose_verdict(
     verdict, leading = leaders
     best = tempered[leading or ()]
     competitors = [entry for entry in hypotheses if entry not in (best, nothing)]
-    state_alone, stated = _minimize_expected_loss([best, *competitors], settings)
+    # A wrong name costs one, a class its ambiguity, because nobody repairs a robot by it.
+    state_alone = 1.0 - best.probability < settings.ambiguity_loss
     is_named = state_alone and verdict == CLASS and OTHER not in best.mechanisms
-    if is_named:
-        stated = [best]
+    stated = [best] if is_named else _choose_class([best, *competitors], settings)
     if best is nothing or _sum_probabilities(stated) < nothing.probability:
         stated = []
         best = nothing
@@ -375,14 +380,13 @@ def allow_related_mechanisms(
     return replace(conclusion, verdict=verdict, alternatives=alternatives)
 
 
-def _minimize_expected_loss(
+def _choose_class(
     ranked: Sequence[Hypothesis], settings: Settings
-) -> tuple[bool, Sequence[Hypothesis]]:
-    """Make the Bayes decision between a name, a class and no statement.
+) -> Sequence[Hypothesis]:
+    """Make the Bayes decision between classes and no statement.
 
-    A wrong name costs one, and so does a class that does not contain the truth. A class
-    costs something by itself and for each further line. No statement costs the loss of
-    a missed effect.
+    A class costs one if it does not contain the truth, something by itself, and
+    something for each further line. No statement costs the loss of a missed effect.
 
     Parameters
     ----------
@@ -393,10 +397,7 @@ def _minimize_expected_loss(
 
     Returns
     -------
-    bool
-        Whether to state the first hypothesis alone.
-    sequence of Hypothesis
-        The class of least loss; empty if the least loss is that of no statement.
+    The class of least loss; empty if the least loss is that of no statement.
     """
     probability = np.array([hypothesis.probability for hypothesis in ranked])
     further_lines = np.arange(len(ranked))
@@ -404,12 +405,9 @@ def _minimize_expected_loss(
     class_losses = (
         settings.ambiguity_loss + settings.width_loss * further_lines + missed
     )
-    silence_loss = settings.missed_loss * probability.sum()
-    name_loss = 1.0 - probability[0]
-    best_class = ranked[: int(np.argmin(class_losses)) + 1]
-    if silence_loss <= min(name_loss, class_losses.min()):
-        best_class = ()
-    return bool(name_loss < class_losses.min()), best_class
+    if settings.missed_loss * probability.sum() <= class_losses.min():
+        return ()
+    return ranked[: int(np.argmin(class_losses)) + 1]
 
 
 def rank_hypotheses(
