@@ -427,11 +427,13 @@ def predict_left_out_residuals(
     (M, rows) array, measured minus predicted, m and rad, base axes
     """
     covariance_root = factor_covariance(fitted.covariance)
-    gram, gradient, blocks = _sum_by_group(fitted, observations, group, covariance_root)
+    gram, gradient = _sum_by_group(fitted, observations, group, covariance_root)
     changes = map(_solve_without, gram, gradient)
     steps = np.array([covariance_root @ change for change in changes])
     left_out = fitted.residual.copy()
-    for indices, plain in blocks:
+    # The sensitivities are computed once more, because those of all observations of a
+    # large campaign need more memory than anything else.
+    for indices, plain, _ in fitted.iterate_sensitivities(observations):
         left_out[indices] += (plain @ steps[group[indices], :, None])[..., 0]
     return left_out
 
@@ -441,7 +443,7 @@ def _sum_by_group(
     observations: Observations,
     group: np.ndarray,
     covariance_root: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, list[tuple[slice, np.ndarray]]]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Sum the products of whitened sensitivities over each of G groups, for P parameters
     in units of a root of their covariance.
 
@@ -449,15 +451,12 @@ def _sum_by_group(
     -------
     gram : (G, P, P), products with each other
     gradient : (G, P), products with the whitened residual
-    blocks : observations of each block, and their sensitivities without whitening
     """
     residual = fitted.whiten(fitted.residual)
     parameters = len(covariance_root)
     gram = np.zeros((group.max() + 1, parameters, parameters))
     gradient = np.zeros((len(gram), parameters))
-    blocks = []
-    for indices, plain, whitened in fitted.iterate_sensitivities(observations):
-        blocks.append((indices, plain))
+    for indices, _, whitened in fitted.iterate_sensitivities(observations):
         scaled = whitened @ covariance_root
         for number in np.unique(group[indices]).tolist():
             members = group[indices] == number
@@ -465,7 +464,7 @@ def _sum_by_group(
             rows = scaled[members].reshape(of_group.size, parameters)
             gram[number] += rows.T @ rows
             gradient[number] += rows.T @ of_group
-    return gram, gradient, blocks
+    return gram, gradient
 
 
 def _solve_without(gram: np.ndarray, gradient: np.ndarray) -> np.ndarray:
