@@ -1,8 +1,9 @@
 """Run daemons for as long as the process that asked for them lives.
 
-`python supervised.py LINK FOLDER` reads from standard input one command a line, as JSON with
-the file of its output. When the input ends, for whatever reason, it ends the daemons with
-everything that they have started, and removes the link and the folder.
+`python supervised.py LINK FOLDER SECONDS` reads from standard input one command a line,
+as JSON with the file of its output. When the input ends, for whatever reason, it ends the
+daemons with everything that they have started, after so many seconds by force, and
+removes the link and the folder.
 """
 
 import ctypes
@@ -19,17 +20,17 @@ import psutil
 # Orphans become children of this process, so that it finds those of an ended daemon
 # (prctl(2)).
 PR_SET_CHILD_SUBREAPER = 36
-# Seconds in which a daemon ends by itself.
-ENDING_S = 3
+# Seconds in which a daemon of Slurm ends by itself.
+ENDING_S = 3.0
 
 
 class Supervisor:
     """The side of the process that asks for daemons."""
 
-    def __init__(self, link, folder):
+    def __init__(self, link, folder, ending_s=ENDING_S):
         # Its session is its own: an interrupt from the terminal does not reach it.
         self._process = subprocess.Popen(
-            [sys.executable, __file__, str(link), str(folder)],
+            [sys.executable, __file__, str(link), str(folder), str(ending_s)],
             stdin=subprocess.PIPE,
             text=True,
             start_new_session=True,
@@ -47,7 +48,7 @@ class Supervisor:
         self._process.wait()
 
 
-def _serve(link, folder):
+def _serve(link, folder, ending_s):
     ctypes.CDLL(None, use_errno=True).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     # Only the end of the input ends this process.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -65,7 +66,7 @@ def _serve(link, folder):
                     preexec_fn=_heed_signals,
                 )
     finally:
-        _end_descendants()
+        _end_descendants(ending_s)
         link.unlink(missing_ok=True)
         shutil.rmtree(folder, ignore_errors=True)
 
@@ -76,11 +77,11 @@ def _heed_signals():
         signal.signal(number, signal.SIG_DFL)
 
 
-def _end_descendants():
+def _end_descendants(ending_s):
     descendants = psutil.Process().children(recursive=True)
     for process in descendants:
         _send(process, signal.SIGTERM)
-    psutil.wait_procs(descendants, timeout=ENDING_S)
+    psutil.wait_procs(descendants, timeout=ending_s)
     # A process that is killed may leave children, which are ours then.
     while descendants := psutil.Process().children(recursive=True):
         for process in descendants:
@@ -106,4 +107,4 @@ def _collect_ended():
 
 
 if __name__ == "__main__":
-    _serve(Path(sys.argv[1]), Path(sys.argv[2]))
+    _serve(Path(sys.argv[1]), Path(sys.argv[2]), float(sys.argv[3]))

@@ -21,7 +21,7 @@ import os, sys, time
 from pathlib import Path
 from supervised import Supervisor
 folder = Path(sys.argv[1])
-supervisor = Supervisor(folder.with_name("link"), folder)
+supervisor = Supervisor(folder.with_name("link"), folder, ending_s=0.3)
 supervisor.start(["sh", "-c", sys.argv[2]], {**os.environ}, folder / "log")
 if sys.argv[3] == "0":
     while len((folder / "pids").read_text().split() if (folder / "pids").exists() else "") < 2:
