@@ -27,7 +27,7 @@ audit: .venv/ready-for-audit
 	$(BIN)/snakemake -j$(CORES) audit
 
 # Of the slow tests none: blind benchmark, planted errors, closed loop, demonstration, tutorial, Slurm, wheel and site are in
-# test-slow. CI adds the twentieth of a commit: make test SLOW="part --part c0ffee"
+# test-slow. CI adds those of one file, which the commit chooses: make test SLOW="one --commit c0ffee"
 SLOW ?= none
 test: .venv/ready-for-tests
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder --slow $(SLOW)

@@ -19,9 +19,6 @@ from elastocal.study.strategies import strategy_from_document
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
-# CI runs one part of this number of parts of the slow tests with each commit.
-PARTS = 20
-
 CONFIG = Path(__file__).resolve().parents[1] / "config"
 
 # Every run draws the same examples, so that a failing test fails again. A slow machine
@@ -39,14 +36,14 @@ hypothesis.settings.load_profile("repeatable")
 def pytest_addoption(parser):
     parser.addoption(
         "--slow",
-        choices=["none", "all", "part"],
+        choices=["none", "all", "one"],
         default="none",
-        help="run slow tests: none, all, or a twentieth",
+        help="run slow tests: none, all, or those of one file",
     )
     parser.addoption(
-        "--part",
+        "--commit",
         default="0",
-        help="hexadecimal number, as of a commit, that chooses the twentieth of the slow tests",
+        help="hexadecimal number that chooses the one file of slow tests",
     )
 
 
@@ -55,12 +52,11 @@ def pytest_collection_modifyitems(config, items):
     first, so that no worker has one left at the end: slow ones, then those that run the
     workflow.
 
-    The tests of a file stay together because they share fixtures: a twentieth of the
-    slow tests is every twentieth slow file.
+    The tests of a file stay together because they share fixtures.
     """
     slow = sorted({item.path for item in items if item.get_closest_marker("slow")})
-    part = int(config.getoption("part")[:8], 16) % PARTS
-    selections = {"none": [], "all": slow, "part": slow[part::PARTS]}
+    number = int(config.getoption("commit")[:8], 16) % max(len(slow), 1)
+    selections = {"none": [], "all": slow, "one": slow[number : number + 1]}
     chosen = selections[config.getoption("slow")]
     deselected = []
     kept = []
