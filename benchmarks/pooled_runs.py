@@ -4,8 +4,8 @@
 docs/blind_cases.parquet`, with tables that `stated_probabilities.py --save` has written
 besides, prints a line for each bin with its 95 % interval (Clopper and
 Pearson, 1934), the largest error of a bin with 30 cases and what calibrated statements
-would show by chance, and how often one wrong mechanism is stated without alternatives if
-the cause is not in the catalogue. A row of a file is a case.
+would show by chance, and how often one wrong mechanism is stated without alternatives,
+and how often any false one, if the cause is not in the catalogue. A row of a file is a case.
 """
 
 import argparse
@@ -51,6 +51,7 @@ def main() -> None:
     print_reliability(cases)
     outside = cases[cases.group == "outside"]
     print("one wrong mechanism alone, outside:", format_rate(outside.wrong_name))
+    print("any false mechanism, outside:", format_rate(outside.false_mechanism))
 
 
 if __name__ == "__main__":

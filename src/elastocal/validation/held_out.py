@@ -432,7 +432,7 @@ def predict_left_out_residuals(
     steps = np.array([covariance_root @ change for change in changes])
     left_out = fitted.residual.copy()
     # The sensitivities are computed once more, because those of all observations of a
-    # large campaign need more memory than anything else.
+    # large campaign need more memory than the Gram matrices of all groups.
     for indices, plain, _ in fitted.iterate_sensitivities(observations):
         left_out[indices] += (plain @ steps[group[indices], :, None])[..., 0]
     return left_out
